@@ -43,6 +43,7 @@ BESIDE = {f"tests/{folder}/test_{name}.py" for folder, names in RESULTS_ALONE.it
 STOPS_THE_BOAT = {"fault", "link"}  # folders
 WORKER = "PYTEST_XDIST_WORKER" in os.environ  # other tests run at the same time
 NICENESS = 5
+MAX_REASON_CHARACTERS = 300
 
 settings.register_profile("quick", max_examples=15, deadline=None)  # for `make check`; everything else tries more
 settings.register_profile("thorough", deadline=None)  # a busy machine fails no test
@@ -113,10 +114,14 @@ class WhatRan:
         self.ran: set[str] = set()
         self.skipped: dict[str, str] = {}
         self.tier_s: defaultdict[str, float] = defaultdict(float)  # setup and teardown included
+        self.first_tries: dict[str, str] = {}  # why those failed that were tried once more
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         name = report.nodeid.partition("[")[0]
         self.tier_s[name.split("/")[1]] += report.duration
+        if str(report.outcome) == "rerun":  # a plugin's word, of which the type knows nothing
+            crash = getattr(report.longrepr, "reprcrash", None)
+            self.first_tries[report.nodeid] = str(report.longrepr) if crash is None else crash.message
         if report.skipped:
             self._skip(name, report.longrepr)
         elif report.when == "call":
@@ -131,7 +136,7 @@ class WhatRan:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """A run of everything ends with the time of each tier, and the statements of the paper that it left out."""
+    """A run of everything ends with why first tries failed, the time of each tier, and the statements left out."""
     if not WORKER and is_whole_run(config):
         config.pluginmanager.register(WhatRan(), WhatRan.__name__)
 
@@ -141,6 +146,8 @@ def pytest_unconfigure(config: pytest.Config) -> None:
     found = config.pluginmanager.get_plugin(WhatRan.__name__)
     if found is not None and found.ran:
         longest_first = sorted(found.tier_s.items(), key=lambda each: -each[1])
+        for name, why in sorted(found.first_tries.items()):
+            print(f"First try of {name}:", " ".join(why.split())[:MAX_REASON_CHARACTERS])
         print("Seconds by tier:", ", ".join(f"{tier} {time_s:.0f}" for tier, time_s in longest_first))
         print(left_out_text(read_table(ROOT), found.ran, found.skipped), end="\n")
 

@@ -110,17 +110,13 @@ async def test_a_page_without_one_of_its_files_is_loaded_again(
 ) -> None:
     async with spawn("dashboard"):
         for name in ("stop.js", "bar.css", "uPlot.iife.min.js"):
-            page, asked = await browser.new_page(), 0
-
-            async def lose_first(route: Any) -> None:
-                nonlocal asked
-                asked += 1
-                await (route.abort() if asked == 1 else route.continue_())
-
-            await page.route(f"**/static/{name}", lose_first)
+            page = await browser.new_page()
+            loads: asyncio.Queue[Any] = asyncio.Queue()
+            page.on("domcontentloaded", loads.put_nowait)
+            await page.route(f"**/static/{name}", lambda route: route.abort(), times=1)
             await page.goto(f"http://127.0.0.1:{config.dashboard.port}/")
             async with asyncio.timeout(WAIT_S):
-                while asked < 2:
-                    await asyncio.sleep(0.05)
+                await loads.get()
+                await loads.get()
             await page.wait_for_selector("body[data-link='live']", timeout=WAIT_S * 1e3)
             await page.close()

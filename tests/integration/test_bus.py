@@ -35,10 +35,12 @@ async def until(condition: Callable[[], bool], timeout_s: float = 5.0) -> None:
 
 
 async def until_received(own: Publisher[m.Thrust], inbox: Latest[m.Thrust]) -> None:
-    """A subscriber is known to its publisher only a moment after it was declared."""
+    """A subscriber is known to its publisher only a moment after it was declared. None is on its way after this."""
     while inbox.value is None:
         own.put(thrust())
         await asyncio.sleep(0.02)
+    last = own.put(thrust())
+    await until(lambda: inbox.value is not None and inbox.value.seq == last.seq)
 
 
 async def test_only_the_controllers_thrust_arrives(open_as: OpenAs) -> None:

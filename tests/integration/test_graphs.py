@@ -59,6 +59,9 @@ async def test_a_hulls_clock_and_fixes_have_their_own_writers(private_sets: tupl
                 times.put(m.SimTime(source_us=CLOCK.now_us(), sim_us=0, stamp_us=1))
                 samples.put(sample)
                 await asyncio.sleep(0.02)
+            last = times.put(m.SimTime(source_us=CLOCK.now_us(), sim_us=0, stamp_us=2))
+            while clock.value.seq != last.seq:  # none is on its way after this
+                await asyncio.sleep(0.01)
         assert (clock.value.producer, imu.value.producer) == ("thrusters", "sensors")
         before = clock.received
         for _ in range(5):

@@ -135,6 +135,8 @@ async def test_nobody_of_the_host_writes_at_the_boards_router(sides: Sides, user
             own, astray = at_home.publisher(topic), lost.publisher(topic)
             report = m.Health(source_us=CLOCK.now_us(), service=user, ready=True, uptime_s=0, cpu_cores=0, rss_mib=1)
             await until(lambda: heard.received > 0, lambda: own.put(report))
+            last = own.put(report)
+            await until(lambda: heard.value is not None and heard.value.seq == last.seq)
             before = heard.received
             for _ in range(5):
                 astray.put(report)

@@ -105,8 +105,13 @@ async def test_mavsdk_gives_places_to_return_to(mooring: Mooring, transcript: Tr
         rally = [item(seq, RALLY_POINT, place, 2) for seq, place in enumerate((FAR, NEAR))]
         await station.ask_until_taken("upload 2 rally points", lambda: station.mission.upload_rally_points(rally))
         await mooring.until_rally(FAR, NEAR)
-        found = await station.mission.download_rallypoints()
-        assert [(each.command, each.x, each.y) for each in found] == [(RALLY_POINT, each.x, each.y) for each in rally]
+        for places in ((NEAR,), (FAR, NEAR), (FAR,), (NEAR, FAR), (FAR, NEAR)):  # what was taken is downloaded at once
+            rally = [item(seq, RALLY_POINT, place, 2) for seq, place in enumerate(places)]
+            await station.ask_until_taken("upload others", lambda: station.mission.upload_rally_points(rally))  # noqa: B023
+            found = await station.mission.download_rallypoints()
+            assert [(each.command, each.x, each.y) for each in found] == [
+                (RALLY_POINT, each.x, each.y) for each in rally
+            ]
         ashore = [rally[0], item(1, RALLY_POINT, ASHORE, 2)]
         assert "INVALID_ARGUMENT" in await station.ask(
             "upload a rally point outside the fence", station.mission.upload_rally_points(ashore)

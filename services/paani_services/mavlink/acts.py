@@ -26,6 +26,7 @@ from paani_services.mavlink.uploads import acknowledge
 
 PROGRESS_S = 0.4  # stations ask again after half a second without an answer
 STOP_TIMEOUT_S = 1.0
+SHOWN_TIMEOUT_S, SHOWN_PERIOD_S = 0.5, 0.01  # the mission in force comes by another key than the answer
 MISSION_NAME = "uploaded"  # the protocol has no names
 
 
@@ -40,7 +41,8 @@ def is_repeated(request: Request, under_way: Request) -> bool:
 class Acts:
     """One press of the button at a time, and one mode of a station; a STOP waits for nothing.
 
-    count: something refused, by its cause. hands: of the stations that are there.
+    count: something refused, by its cause. hands: of the stations that are there. shows: whether a download gives
+    what an order asked for.
     """
 
     def __init__(
@@ -50,9 +52,10 @@ class Acts:
         clock: Clock,
         count: Callable[[str], None],
         hands: Callable[[], frozenset[int]],
+        shows: Callable[[MissionOrder], bool],
     ) -> None:
         self._client, self._missions, self._clock = client, missions, clock
-        self._count, self._hands = count, hands
+        self._count, self._hands, self._shows = count, hands, shows
         self._changing: dict[Station, Request] = {}
         self._tasks = set[asyncio.Task[None]]()
         self._arming: Request | None = None
@@ -113,7 +116,16 @@ class Acts:
         result, text = mission_result(answer)
         if text:
             self._count("mavlink_refused")
+        else:
+            await self._until_shown(order)
         acknowledge(order.station, order.target, result, order.kind, self._clock.now_us(), text)
+
+    async def _until_shown(self, order: MissionOrder) -> None:
+        """A station that downloads at once is given what it sent, unless somebody else has sent more meanwhile."""
+        for _ in range(round(SHOWN_TIMEOUT_S / SHOWN_PERIOD_S)):
+            if self._shows(order):
+                return
+            await asyncio.sleep(SHOWN_PERIOD_S)
 
     async def _put_in_force(self, order: MissionOrder) -> MissionAnswer | None:
         name = "" if order.legs is None else MISSION_NAME

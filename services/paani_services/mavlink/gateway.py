@@ -66,7 +66,7 @@ class Gateway:
         self.stations: list[Station] = []
         self.commander_us: int | None = None  # when a station that may command was heard last
         self._snapshot = Snapshot(now_us=0)
-        self._missions = MissionExchange(send, count, self._is_trusted)
+        self.missions = MissionExchange(send, count, self._is_trusted)
         self.parameters = ParameterExchange(try_parameter, count, self._is_trusted, advisor, cruise_mps)
         self.logs = LogTransfers(count, self._is_trusted)
         self._announcer = Announcer()
@@ -78,7 +78,7 @@ class Gateway:
             "PING": self._ping,
             "TIMESYNC": self._timesync,
             **self.parameters.handlers,
-            **self._missions.handlers,
+            **self.missions.handlers,
             "MISSION_SET_CURRENT": self._refuse_current,
             "FILE_TRANSFER_PROTOCOL": self._refuse_file,
             **self.logs.handlers,
@@ -90,7 +90,7 @@ class Gateway:
         """Send what is due. To be called 50 times a second."""
         now_us, self._snapshot = snapshot.now_us, snapshot
         texts = self._announcer.observe(snapshot)
-        news = [*self._missions.follow(snapshot), *self.parameters.follow(snapshot)]
+        news = [*self.missions.follow(snapshot), *self.parameters.follow(snapshot)]
         self.logs.follow(snapshot)
         for station in tuple(self.stations):
             if station.stick is not None:
@@ -137,7 +137,7 @@ class Gateway:
     def remove(self, station: Station) -> None:
         """Forget a station whose link has ended."""
         self._welcomed.discard(station)
-        self._missions.forget(station)
+        self.missions.forget(station)
         self.logs.forget(station)
         if station in self.stations:
             self.stations.remove(station)
@@ -252,7 +252,7 @@ class Gateway:
             return None
         if message_id == HEARTBEAT:
             self._camera.send_heartbeat(station, self._snapshot.now_us)
-        message = self._missions.current if message_id == MISSION_CURRENT else BUILDERS[message_id](self._snapshot)
+        message = self.missions.current if message_id == MISSION_CURRENT else BUILDERS[message_id](self._snapshot)
         if message is None:
             return False
         station.send(message, self._snapshot.now_us)

@@ -30,6 +30,7 @@ INVALID_SEQUENCE, DENIED = dialect.MAV_MISSION_INVALID_SEQUENCE, dialect.MAV_MIS
 NO_PARTS = "mission: whole or not at all"
 NO_PLACE = "mission: the boat does not know its place yet"
 NO_LEGS = Legs((), {})
+NO_KEY = ((object(),) * 3, object(), 0, 0)  # of a plan of nothing: no mission is equal to it
 
 
 class MissionOrder(NamedTuple):
@@ -54,7 +55,7 @@ class MissionExchange:
     ) -> None:
         self._send, self._count, self._is_trusted = send, count, is_trusted
         self._snapshot = Snapshot(now_us=0)
-        self._plan, self._plan_key = EMPTY, (object(), object(), 0, 0)
+        self._plan, self._plan_key = EMPTY, NO_KEY
         self._uploaded: Uploaded | None = None  # whose legs were in force
         self._newest: Uploaded | None = None  # which may be refused
         self._uploads, self._upload_count = Uploads(count), 0
@@ -85,7 +86,7 @@ class MissionExchange:
         self._uploads.tick(snapshot.now_us)
         legs, prediction = snapshot.legs, snapshot.prediction
         if legs is None:
-            self._plan, self._plan_key = EMPTY, (object(), object(), 0, 0)
+            self._plan, self._plan_key = EMPTY, NO_KEY
         elif snapshot.pose is not None:
             home = prediction.home if prediction is not None else self._plan_key[1]
             key = ((legs, snapshot.fence, snapshot.rally), home, snapshot.pose.epoch, self._upload_count)
@@ -94,6 +95,13 @@ class MissionExchange:
                     self._uploaded = self._newest
                 self._plan, self._plan_key = plan_of(snapshot, self._uploaded), key
         return self._news(snapshot)
+
+    def shows(self, order: MissionOrder) -> bool:
+        """Whether a station that downloads now is given what this order asked for."""
+        parts, _, _, upload_count = self._plan_key
+        asked = (order.legs, order.fence, order.rally)
+        is_planned = all(part is None or part == planned for part, planned in zip(asked, parts, strict=True))
+        return is_planned and upload_count == self._upload_count
 
     def forget(self, station: Station) -> None:
         """A station whose link has ended."""

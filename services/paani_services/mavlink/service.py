@@ -64,7 +64,10 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
         signer = Signer(await asyncio.to_thread(read_signing_key, settings.signing_key_file), clock.now_us())
     inputs = Inputs(bus, clock)
     client = OperatorClient(bus, clock)
-    acts = Acts(client, MissionClient(bus, clock), clock, bus.count_drop, lambda: gateway.hands(clock.now_us()))
+    acts = Acts(
+        client, MissionClient(bus, clock), clock, bus.count_drop, lambda: gateway.hands(clock.now_us()),
+        lambda order: gateway.missions.shows(order),
+    )  # fmt: skip
     trials = Trials(bus, clock, lambda: inputs.snapshot().shadow, lambda *ended: gateway.parameters.answer(*ended))
     video = Video(bus.pull_picture(keys.PICTURE), settings, config.bus.vessel, bus.count_drop)
     camera = Camera(config.bus.vessel, lambda: stream_of(config, video))

@@ -46,13 +46,15 @@ class Soaked(msgspec.Struct, frozen=True, kw_only=True):
     """What a process took after the warm-up; slopes by least squares.
 
     Anonymous memory is what a process itself has asked for. RSS has pages of files as well, which the kernel takes back
-    and brings again by what else the machine does.
+    and brings again by what else the machine does. Lasting: the smaller slope of the two halves of the time, of
+    anonymous memory; what is taken once, when something happens first, is in one of them alone.
     """
 
     restarts: int
     rss_mib: float
     rss_slope_mib_h: float
     anonymous_slope_mib_h: float
+    lasting_slope_mib_h: float
     descriptors: tuple[int, int]
     threads: tuple[int, int]
 
@@ -115,15 +117,18 @@ def soak_text(report: SoakReport) -> str:
 
 
 def soaked(samples: Sequence[Sample]) -> Soaked:
-    """Figures of one process from samples in order, at least three of them in its last life after the warm-up."""
+    """Figures of one process from samples in order, at least four of them in its last life after the warm-up."""
     driven_s = samples[-1].at_s - samples[0].at_s
     warm_s = samples[0].at_s + min(WARM_UP * driven_s, WARM_UP_MAX_S)
     warm = [each for each in samples if each.at_s >= warm_s]
+    middle = len(warm) // 2
+    halves = [[(each.at_s, each.anonymous_mib) for each in half] for half in (warm[:middle], warm[middle:])]
     return Soaked(
         restarts=len({each.pid for each in samples}) - 1,
         rss_mib=warm[-1].rss_mib,
         rss_slope_mib_h=slope_per_h((each.at_s, each.rss_mib) for each in warm),
         anonymous_slope_mib_h=slope_per_h((each.at_s, each.anonymous_mib) for each in warm),
+        lasting_slope_mib_h=min(slope_per_h(half) for half in halves),
         descriptors=(warm[0].descriptors, warm[-1].descriptors),
         threads=(warm[0].threads, warm[-1].threads),
     )

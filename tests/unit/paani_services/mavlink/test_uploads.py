@@ -318,3 +318,36 @@ def test_what_the_operators_process_answers() -> None:
         result, text = mission_result(MissionAnswer(refusal))
         assert (result == common.MAV_MISSION_ACCEPTED) is (refusal is m.MissionRefusal.NONE)
         assert len(text) <= 50
+
+
+def test_an_order_is_shown_once_a_download_gives_it() -> None:
+    """The mission in force is heard later than the answer of the operator's process."""
+    port, peer = made()
+    for kind, part in ((MISSION, "legs"), (RALLY, "rally")):
+        upload(peer, [waypoint(0) if kind == MISSION else Item(5100, place_e7=PLACES[1])], kind)
+        order = port.sent[-1]
+        assert not port.gateway.missions.shows(order)
+        port.gateway.tick(in_order())
+        assert not port.gateway.missions.shows(order)
+        port.gateway.tick(
+            in_order(mission=m.Mission(source_us=1, name="a", **{"legs": (), part: getattr(order, part)}))
+        )
+        assert port.gateway.missions.shows(order)
+
+
+def test_the_same_mission_uploaded_once_more_is_shown_when_the_plan_has_its_items() -> None:
+    port, peer = made()
+    upload(peer, [waypoint(0)])
+    in_force = in_order(mission=m.Mission(source_us=1, name="a", legs=port.sent[-1].legs or ()))
+    port.gateway.tick(in_force)
+    upload(peer, [waypoint(0)])
+    assert not port.gateway.missions.shows(port.sent[-1])
+    port.gateway.tick(in_force)
+    assert port.gateway.missions.shows(port.sent[-1])
+
+
+def test_nothing_is_shown_before_the_mission_is_known() -> None:
+    port, peer = made()
+    upload(peer, [waypoint(0)])
+    port.gateway.tick(in_order(route=None, mission=None))
+    assert not port.gateway.missions.shows(port.sent[-1])

@@ -42,6 +42,16 @@ def test_growth_is_that_after_the_warm_up(growth_mib_h: float) -> None:
     assert keeps_bars(report(found)) is (growth_mib_h <= 1.0)
 
 
+@pytest.mark.parametrize("taken_at", range(10, 61))
+def test_what_is_taken_once_does_not_last_and_what_is_taken_on_and_on_does(taken_at: int) -> None:
+    """The warm-up ends with the tenth look."""
+    once = [
+        msgspec.structs.replace(each, anonymous_mib=each.anonymous_mib + 5.0 * (k >= taken_at))
+        for k, each in enumerate(samples(3.0))
+    ]
+    assert soaked(once).lasting_slope_mib_h == pytest.approx(6.0)
+
+
 def test_a_restart_is_no_way_to_keep_memory_flat() -> None:
     found = soaked(samples(0.0, restarted=True))
     assert found.restarts == 1
