@@ -116,10 +116,10 @@ async def serious_in_every_palette(page: Any) -> list[str]:
     return found
 
 
-async def test_recordings_the_past_and_a_replay_are_legible_in_every_palette(
+async def test_recordings_and_the_past_are_legible_in_every_palette(
     browser: Any, boat: Boat, spawn: Spawn, config: Config, tmp_path: Path
 ) -> None:
-    recording = await asyncio.to_thread(finished, tmp_path, 200, 20)
+    await asyncio.to_thread(finished, tmp_path, 200, 20)
     async with spawn("dashboard", f"recorder.folder={tmp_path}"):
         page = (await watch(browser, config)).page
         await until(page, "paani.overlay.mask_seq !== null")
@@ -134,7 +134,12 @@ async def test_recordings_the_past_and_a_replay_are_legible_in_every_palette(
         await press_strip(page, 0.99)
         await until(page, "document.querySelector('#past-word').textContent === 'PAST'")
         assert await serious_in_every_palette(page) == []
+
+
+async def test_a_replay_is_legible_in_every_palette(browser: Any, spawn: Spawn, config: Config, tmp_path: Path) -> None:
+    recording = await asyncio.to_thread(finished, tmp_path, 200, 20)
     async with spawn("dashboard", f"dashboard.replayed={recording}"):
         page = (await watch(browser, config)).page
         await until(page, "document.querySelector('#mode').textContent === 'REPLAY' && paani.shownUs !== null")
+        await until(page, "document.querySelector('#past-what').textContent.endsWith('read-only')")
         assert await serious_in_every_palette(page) == []

@@ -97,3 +97,28 @@ async def test_the_replayed_file_is_played_by_the_same_controls(
         await page.click("#time-play")
         await until(page, f"{pose}.startsWith('1.') || {pose}.startsWith('2.')")
         assert watched.errors == []
+
+
+async def test_a_replay_that_could_not_be_read_at_first_is_read_again(
+    browser: Any, spawn: Spawn, config: Config, tmp_path: Path
+) -> None:
+    """Its samples by themselves, as on a machine that is busy when the page opens; its messages at a press of Play."""
+    path = await asyncio.to_thread(finished, tmp_path, 200, 20)
+    refused = {"series": 1, "frames": 1}
+
+    async def answer(route: Any) -> None:
+        what = "series" if "/series" in route.request.url else "frames"
+        refused[what] -= 1
+        if refused[what] < 0:
+            await route.continue_()
+        else:
+            await route.fulfill(status=503, json={"error": f"{what}: busy"})
+
+    async with spawn("dashboard", f"dashboard.replayed={path}"):
+        page = await browser.new_page(service_workers="block")
+        await page.route("**/api/replayed/**", answer)
+        await page.goto(f"http://127.0.0.1:{config.dashboard.port}/")
+        await until(page, "document.querySelector('#past-what').textContent.endsWith('frames: busy')")
+        assert "series: busy" in await page.text_content("#log")
+        await page.click("#time-play")
+        await until(page, "document.querySelector('#map-pose').textContent.startsWith('4.')")

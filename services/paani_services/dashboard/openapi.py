@@ -22,6 +22,7 @@ from paani_services.dashboard import (
     requests,
     settings_rows,
     tiles,
+    time_series,
     tuning,
 )
 from paani_services.dashboard.gatekeeper import KEY_HEADER, LoginRequest
@@ -80,7 +81,7 @@ OPERATIONS = (
     Operation("post", "/api/drive/wheel", "Take the wheel.", a.DoneAnswer, driving.HandRequest, errors=ASK),
     Operation("post", "/api/drive/override", "Override the advice.", a.DoneAnswer, driving.HandRequest, errors=ASK),
     Operation("post", "/api/drive/setpoint", "What the hand says.", a.SentAnswer, driving.SetpointRequest, errors=ACT),
-    Operation("get", "/api/history", "Samples and events of the last ten minutes.", past.Series, errors=(401,)),
+    Operation("get", "/api/history", "Samples and events of the last ten minutes.", time_series.Series, errors=(401,)),
     Operation(
         "get",
         "/api/history/frames",
@@ -92,7 +93,7 @@ OPERATIONS = (
     Operation("get", "/api/settings", "What it runs with.", list[settings_rows.SettingRow], errors=(401,)),
     Operation("get", "/api/recordings", "Which there are.", recordings.RecordingList, errors=(401,)),
     Operation("get", "/api/recordings/{name}/file", "One, as it is.", BYTES, errors=(401, 404)),
-    Operation("get", "/api/recordings/{name}/series", "Its samples and events.", past.Series, errors=READ),
+    Operation("get", "/api/recordings/{name}/series", "Its samples and events.", time_series.Series, errors=READ),
     Operation(
         "get",
         "/api/recordings/{name}/frames",
@@ -101,7 +102,9 @@ OPERATIONS = (
         query=past.WindowQuery,
         errors=READ,
     ),
-    Operation("get", "/api/replayed/series", "Samples and events of what is replayed.", past.Series, errors=READ),
+    Operation(
+        "get", "/api/replayed/series", "Samples and events of what is replayed.", time_series.Series, errors=READ
+    ),
     Operation("get", "/api/replayed/frames", "Its frames.", BYTES, query=past.WindowQuery, errors=READ),
     Operation(
         "post",

@@ -59,7 +59,8 @@ class PageServices(msgspec.Struct, frozen=True):
 
 
 def page_settings(config: Config) -> PageSettings:
-    source, is_replay = config.camera.source, config.bus.vessel.endswith(keys.REPLAY_SUFFIX)
+    source = config.camera.source
+    is_replay = config.bus.vessel.endswith(keys.REPLAY_SUFFIX) or bool(config.dashboard.replayed)
     return PageSettings(
         vessel=config.bus.vessel,
         domain=config.bus.domain,

@@ -8,10 +8,10 @@ import msgspec
 from aiohttp import web
 
 from paani_services.dashboard.history import MAX_WINDOW_US, History, events_since
-from paani_services.dashboard.hub import Event, Hub
+from paani_services.dashboard.hub import Hub
 from paani_services.dashboard.requests import BadRequestError, NoQuery, decode_query
 from paani_services.dashboard.responses import json_response
-from paani_services.dashboard.time_series import Columns, columns_of
+from paani_services.dashboard.time_series import Series, columns_of
 
 Moment = Annotated[int, msgspec.Meta(ge=0, le=2**53)]
 
@@ -21,13 +21,6 @@ class WindowQuery(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     from_us: Moment
     to_us: Moment
-
-
-class Series(msgspec.Struct, frozen=True, kw_only=True):
-    """What there is of a drive: its samples, one a second, and its events."""
-
-    samples: Columns
-    events: tuple[Event, ...]
 
 
 class PastRoutes:

@@ -1,8 +1,8 @@
-"""Reads a recording for the page: `python -m paani_services.dashboard.recording_reader series|frames FILE ...`.
+"""Reads a recording for the page: `python -m paani_services.dashboard.recording_reader NICE series|frames FILE ...`.
 
-A process of its own, at a low priority: reading a recording takes the processor for seconds, and neither the server nor
-the boat may wait for it. What it writes to standard output is the body of the answer; a recording that cannot be read
-is one line on standard error and exit code 2.
+A process of its own, lower in priority by NICE: reading a recording takes the processor for seconds, and neither the
+server nor a boat may wait for it. What it writes to standard output is the body of the answer; a recording that cannot
+be read is one line on standard error and exit code 2.
 """
 
 from __future__ import annotations
@@ -27,10 +27,8 @@ from paani_services.dashboard.frames import FrameHeader, encode_frame, pack_fram
 from paani_services.dashboard.hub import Event
 from paani_services.dashboard.operator_events import describe_operator_change
 from paani_services.dashboard.page_state import page_settings
-from paani_services.dashboard.past import Series
-from paani_services.dashboard.time_series import SAMPLE_PERIOD_US, SAMPLED, Sample, columns_of, sample_of
+from paani_services.dashboard.time_series import SAMPLE_PERIOD_US, SAMPLED, Sample, Series, columns_of, sample_of
 
-NICE = 10
 THIN_US = 90_000  # people read numbers no faster than ten times a second
 MAX_SAMPLES, MAX_EVENTS = 7200, 1000  # two hours: a part of a recording has ten minutes
 MAX_BYTES = 32 << 20
@@ -135,12 +133,12 @@ def _event(before: m.Message | None, now: m.Message, at_us: int) -> Event | None
 
 
 def main(arguments: list[str]) -> int:
-    """`series FILE`, or `frames FILE FROM_US TO_US`."""
-    os.nice(NICE)
+    """`NICE series FILE`, or `NICE frames FILE FROM_US TO_US`."""
+    os.nice(int(arguments[0]))
     try:
-        log = open_log(Path(arguments[1]))
-        is_series = arguments[0] == "series"
-        body = msgspec.json.encode(read_series(log)) if is_series else read_frames(log, *map(int, arguments[2:4]))
+        log = open_log(Path(arguments[2]))
+        is_series = arguments[1] == "series"
+        body = msgspec.json.encode(read_series(log)) if is_series else read_frames(log, *map(int, arguments[3:5]))
     except UserError as error:
         sys.stderr.write(f"{error}\n")
         return 2

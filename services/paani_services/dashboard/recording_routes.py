@@ -20,6 +20,7 @@ from paani_services.dashboard.responses import error_response, json_response
 
 READER = "paani_services.dashboard.recording_reader"
 READ_TIMEOUT_S = 60.0
+NICE = 5  # of whoever reads beside a boat, as of drawing; at 10 a busy machine had people wait for 20 s and more
 MAX_WAITING = 4  # requests to read that wait for the one being served
 
 Refuse = Callable[[web.Request, str], web.Response | None]
@@ -115,8 +116,9 @@ class RecordingRoutes:
 
     async def _read(self, request: web.Request, *words: str) -> bytes | web.Response:
         """What the reader writes of a recording, or the error response; one reader at a time."""
+        name = request.match_info.get("name")
         try:
-            path = await asyncio.to_thread(self._find, request.match_info.get("name"))
+            path = await asyncio.to_thread(self._find, name)
         except RecordingRefusedError as error:
             return error_response(error.status, str(error), "name")
         if self._waiting >= MAX_WAITING:
@@ -124,14 +126,15 @@ class RecordingRoutes:
         self._waiting += 1
         try:
             async with self._reading:
-                return await _run_reader(words[0], path, *words[1:])
+                nice = NICE if name is not None else 0  # a page that only replays has no boat beside it
+                return await _run_reader(nice, words[0], path, *words[1:])
         finally:
             self._waiting -= 1
 
 
-async def _run_reader(what: str, path: Path, *words: str) -> bytes | web.Response:
+async def _run_reader(nice: int, what: str, path: Path, *words: str) -> bytes | web.Response:
     reader = await asyncio.create_subprocess_exec(
-        sys.executable, "-m", READER, what, str(path), *words,
+        sys.executable, "-m", READER, str(nice), what, str(path), *words,
         stdin=asyncio.subprocess.DEVNULL, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE,
     )  # fmt: skip
     try:

@@ -9,6 +9,7 @@ import msgspec
 
 from paani import keys
 from paani import messages as m
+from paani_services.dashboard.hub import Event
 
 SAMPLE_PERIOD_US = 1_000_000
 T = TypeVar("T", bound=m.Message)
@@ -44,6 +45,13 @@ class Columns(msgspec.Struct, frozen=True, kw_only=True):
 
     names: tuple[str, ...]
     values: tuple[tuple[Any, ...], ...]
+
+
+class Series(msgspec.Struct, frozen=True, kw_only=True):
+    """What there is of a drive: its samples, one a second, and its events."""
+
+    samples: Columns
+    events: tuple[Event, ...]
 
 
 class Newest(Protocol):

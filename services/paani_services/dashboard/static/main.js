@@ -28,7 +28,7 @@ import { renderTopbar } from "./topbar.js";
 import { bindTuning } from "./tuning.js";
 import { View } from "./view.js";
 
-const RENDER_PERIOD_MS = 100;
+const RENDER_PERIOD_MS = 100, REPLAY_AGAIN_MS = 3000, BUSY = 503;
 const LAYERS = ["mask", "boxes", "lanes", "limit", "hull"];
 const live = new View(() => performance.now());
 const camera = new Camera(live);
@@ -53,11 +53,15 @@ function onMessage(key, header, body) {
   if (key === "dashboard/sample") time.history.series.append(value);
 }
 
-/** Once: the settings come again with each connection. @param {string} name of the recording that this page is of */
+/** Once, and again where the server was busy or gone: the settings come again with each connection. @param {string} name of the recording that this page is of */
 function replay(name) {
   if (isReplayed) return;
   isReplayed = true;
-  time.replay(name, fromS).catch((error) => addLine({ at_us: Date.now() * 1000, level: "warn", text: `${name}: ${error.message}` }));
+  time.replay(name, fromS).catch((error) => {
+    addLine({ at_us: Date.now() * 1000, level: "warn", text: `${name}: ${error.message}` });
+    isReplayed = false;
+    if (error.cause === BUSY) setTimeout(() => replay(name), REPLAY_AGAIN_MS);
+  });
 }
 
 /** @param {boolean} isOpen */

@@ -7,11 +7,11 @@ import { TIME_TEXTS } from "./text.js";
 
 const MAX_SAMPLES = 600;
 
-/** The answer to a request; throws an error with the server's reason. @param {string} path */
+/** The answer to a request; throws an error with the server's reason, and its status as the cause. @param {string} path */
 export async function ask(path) {
   const answer = await fetch(path).catch(() => null);
   if (!answer) throw new Error(TIME_TEXTS.noServer);
-  if (!answer.ok) throw new Error(String((await answer.json()).error));
+  if (!answer.ok) throw new Error(String((await answer.json()).error), { cause: answer.status });
   return answer;
 }
 

@@ -72,10 +72,11 @@ export class Playback {
     this.feed();
   }
 
-  /** Play or pause; at the end, from the beginning. */
+  /** Play or pause; at the end, from the beginning; where loading failed before anything was there, load again. */
   toggle() {
     if (!this.source) return;
     if (!this.playing && this.atUs >= this.source.series.endUs) this.seek(this.source.series.startUs);
+    else if (!this.playing && !this.toUs && !this.loading) this.seek(this.atUs);
     this.playing = !this.playing;
   }
 

@@ -84,6 +84,7 @@ def test_restarts_are_counted() -> None:
         (("camera.source=webcam:1",), "sim", "camera"),
         (("camera.source=/tmp/v.mp4",), "sim", "file"),
         (("bus.vessel=boat_replay", "camera.source=/tmp/drive.mcap"), "replay", "file"),
+        (("dashboard.replayed=/tmp/drive.mcap",), "replay", "sim"),
         (("profile=hil",), "hil", "sim"),
         (("profile=hull",), "hull", "camera"),
         (("profile=hull", "bus.vessel=boat_replay"), "replay", "camera"),
