@@ -55,8 +55,13 @@ export function setText(element, text) {
   if (element && element.textContent !== text) element.textContent = text;
 }
 
-/** How much larger than on a desk's screen everything is drawn, as the page's style says. */
-export const screenScale = () => parseFloat(getComputedStyle(document.documentElement).fontSize) / 10;
+let scale = 0;
+
+/** How much larger than on a desk's screen everything is drawn, as the page's style says; asked again where the window was resized, as each answer waits for the style of the whole page. */
+export function screenScale() {
+  if (!scale) addEventListener("resize", () => { scale = 0; }, { once: true });
+  return (scale ||= parseFloat(getComputedStyle(document.documentElement).fontSize) / 10);
+}
 
 /** @param {string} id @returns {any} */
 export const byId = (id) => document.getElementById(id);
