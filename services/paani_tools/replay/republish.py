@@ -226,7 +226,7 @@ async def _unless_moving(observer: Bus, work: Coroutine[Any, Any, RepublishResul
 async def _dashboard(config: Config, observer: Bus) -> AsyncIterator[None]:
     """The dashboard process beside the replay; dies with it."""
     process = await asyncio.create_subprocess_exec(
-        sys.executable, "-m", "paani_tools.up.child", str(os.getpid()), "0", DASHBOARD,
+        sys.executable, "-m", "paani_tools.up.child", str(os.getpid()), DASHBOARD,
         env={**os.environ, "PAANI_CONFIG_JSON": encode_config(config).decode()},
         stderr=asyncio.subprocess.PIPE,
     )  # fmt: skip

@@ -17,7 +17,7 @@ from paani.config import Config, encode_config
 from paani.errors import UserError
 from paani_tools.up.backoff import Backoff
 from paani_tools.up.log_files import keep_bounded, open_log
-from paani_tools.up.plan import EYE, Plan
+from paani_tools.up.plan import Plan
 from paani_tools.up.silence import ROUTER, Silence
 
 WATCH_S = 0.5
@@ -26,7 +26,6 @@ RECORDER = "recorder"
 STOP_RECORDER_S, STOP_ROUTER_S, KILL_S = 0.9, 0.4, 0.3
 STOP_S = 1.3
 GIVE_UP_FAILURES = 5  # ends in a row of a process that was never alive
-NICE = {EYE: 5}  # drawing yields to the control chain
 USER_MISTAKE = 2
 # One thread for each native library: the processes are the parallelism.
 CHILD_ENVIRONMENT = {
@@ -166,7 +165,6 @@ class Supervisor:
             "-m",
             "paani_tools.up.child",
             str(os.getpid()),
-            str(NICE.get(unit.name, 0)),
             unit.name,
             env=environment(self._config),
             stdin=asyncio.subprocess.DEVNULL,

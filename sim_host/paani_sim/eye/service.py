@@ -6,6 +6,7 @@ Everything that touches OpenGL happens in one thread of its own: a context belon
 from __future__ import annotations
 
 import asyncio
+import os
 from concurrent.futures import ThreadPoolExecutor
 
 import cv2
@@ -20,6 +21,8 @@ from paani_sim.eye.camera_faults import CameraFaults
 from paani_sim.eye.configured_camera import boat_pose, open_eye
 from paani_sim.eye.renderer import Eye
 from paani_sim.worlds.load import configured_scenario
+
+NICE = 5  # of the thread that draws, and of those that the renderer begins: they yield to the control chain
 
 
 def open_camera(config: Config) -> tuple[Eye, CameraFaults]:
@@ -43,7 +46,7 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     """Render the newest pose at `eye.rate_hz`; alive once the first picture has come out."""
     poses = bus.latest(keys.TRUE_POSE)
     pictures = bus.picture_publisher(keys.RENDERED)
-    loop, gl_thread = asyncio.get_running_loop(), ThreadPoolExecutor(1, "gl")
+    loop, gl_thread = asyncio.get_running_loop(), ThreadPoolExecutor(1, "gl", os.nice, (NICE,))
     settings, period_us = config.eye, round(1e6 / config.eye.rate_hz)
     eye, faults = await loop.run_in_executor(gl_thread, open_camera, config)
     try:

@@ -2,6 +2,8 @@
 
 import asyncio
 import contextlib
+import os
+import threading
 from collections.abc import Awaitable, Callable
 
 import cv2
@@ -30,6 +32,11 @@ def truth(source_us: int, *, sim_us: int = 2_000_000, x_m: float = 20.0) -> m.Tr
         source_us=source_us, sim_us=sim_us, x_m=x_m, y_m=0.0, z_m=0.177, roll_rad=0.02, pitch_rad=-0.01,
         yaw_rad=0.4, surge_mps=0.0, sway_mps=0.0, yaw_rate_radps=0.0,
     )  # fmt: skip
+
+
+def niceness(thread: int | None) -> int:
+    assert thread is not None
+    return os.getpriority(os.PRIO_PROCESS, thread)
 
 
 def require_gl() -> None:
@@ -104,6 +111,8 @@ async def test_pose_in_picture_out(open_as: Callable[[str], Awaitable[Bus]], con
                     async with asyncio.timeout(0.05):
                         seen.append(await pictures.next())
                 assert not eye.done()
+            drawing = next(each for each in threading.enumerate() if each.name.startswith("gl"))
+            assert niceness(drawing.native_id) == niceness(threading.get_native_id()) + 5, "drawing alone yields"
     finally:
         eye.cancel()
         with contextlib.suppress(asyncio.CancelledError):
