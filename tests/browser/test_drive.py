@@ -30,6 +30,7 @@ PRESS_B = """() => {
   const buttons = [false, true].map((pressed) => ({ pressed }));
   navigator.getGamepads = () => [null, { connected: true, axes: [0, 0], buttons }];
 }"""
+IS_WHEEL_WHOLE = "(({ scrollWidth, clientWidth }) => scrollWidth <= clientWidth)(document.querySelector('#wheel'))"
 HIDE = """(hidden) => {
   Object.defineProperty(document, "hidden", { value: hidden, configurable: true });
   document.dispatchEvent(new Event("visibilitychange"));
@@ -92,12 +93,16 @@ async def test_a_hand_on_the_page_drives_while_it_holds_and_the_wheel_is_taken_o
         await page.keyboard.down("w")
         await page.keyboard.down("ArrowLeft")
         await orders.until(lambda found: found.stick == (1.0, 1.0))
+        assert await page.inner_text("#drive-asks") == "Ahead 100 %, to port 100 %"
+        assert await page.get_attribute("#stick", "data-held") == "true"
         await page.screenshot(path=tmp_path / "manual.png")
         await page.keyboard.up("ArrowLeft")
         await orders.until(lambda found: found.stick == (1.0, 0.0))
         await page.keyboard.up("w")
         await orders.until(lambda found: found.stick == (0.0, 0.0))
         assert orders.mode is DriveMode.MANUAL
+        assert await page.inner_text("#drive-asks") == "Let go: zero thrust"
+        assert await page.get_attribute("#stick", "data-held") == "false"
 
         for let_go in ("dispatchEvent(new Event('blur'))", "dispatchEvent(new Event('pagehide'))"):
             await page.keyboard.down("d")
@@ -115,6 +120,7 @@ async def test_a_hand_on_the_page_drives_while_it_holds_and_the_wheel_is_taken_o
         await page.mouse.down()
         await page.mouse.move(middle[0], middle[1] - box["height"] / 4)
         await orders.until(lambda found: found.stick == (0.5, 0.0))
+        assert await page.inner_text("#drive-asks") == "Ahead 50 %"
         await page.mouse.up()
         await orders.until(lambda found: found.stick == (0.0, 0.0))
 
@@ -125,6 +131,7 @@ async def test_a_hand_on_the_page_drives_while_it_holds_and_the_wheel_is_taken_o
             await page.evaluate(PAD, axes)
             await orders.until(lambda found, expected=expected: found.stick == expected)  # type: ignore[misc]
             await asyncio.sleep(0.3)
+        await until(page, "document.querySelector('#drive-asks').textContent === 'Ahead 50 %, to starboard 100 %'")
         await page.evaluate("dispatchEvent(new Event('blur'))")
         await orders.until(lambda found: found.stick == (0.0, 0.0))
         await asyncio.sleep(0.3)
@@ -154,6 +161,7 @@ async def test_a_hand_on_the_page_drives_while_it_holds_and_the_wheel_is_taken_o
         await until(page, "document.querySelector('#drive').dataset.driving === 'false'")
         assert "another page" in await page.inner_text("#drive-wheel")
         await until(page, "document.querySelector('#wheel').textContent === 'another page'")
+        assert await page.evaluate(IS_WHEEL_WHOLE)
         await until(other, "document.querySelector('#wheel').textContent === 'this page'")
         await drive_manually(other, orders)
         await page.keyboard.down("s")

@@ -5,7 +5,7 @@
 
 import { isReplay } from "./inhibits.js";
 import { hand, hasKey, post } from "./requests.js";
-import { DRIVE_TEXTS, MODE_BARS, MODE_TEXTS, WHEEL_TEXTS, byId, fixed, make, setText } from "./text.js";
+import { DRIVE_TEXTS, MODE_BARS, MODE_TEXTS, WHEEL_TEXTS, byId, fixed, make, sentence, setText } from "./text.js";
 import { describeWheel } from "./wheel.js";
 
 const SAY_MS = 80; // the operator's process lets a stick go that it has not heard of for 300 ms
@@ -86,6 +86,15 @@ function renderStick() {
   const [surge, turn] = wanted(), scale = 35 / Math.max(1, Math.hypot(surge, turn)); // a corner is drawn on the rim
   byId("stick-knob").setAttribute("cx", String(50 - scale * turn));
   byId("stick-knob").setAttribute("cy", String(50 - scale * surge));
+  byId("stick").dataset.held = String(surge !== 0 || turn !== 0);
+  setText(byId("drive-asks"), askedText(surge, turn));
+}
+
+/** What a hand asks for, in words. @param {number} surge ahead @param {number} turn to port */
+function askedText(surge, turn) {
+  const part = (/** @type {number} */ value, /** @type {string} */ more, /** @type {string} */ less) => value && `${value > 0 ? more : less} ${fixed(Math.abs(value) * 100, 0)} %`;
+  const parts = [part(surge, DRIVE_TEXTS.ahead, DRIVE_TEXTS.astern), part(turn, DRIVE_TEXTS.port, DRIVE_TEXTS.starboard)].filter(Boolean);
+  return parts.length ? sentence(parts.join(", ")) : DRIVE_TEXTS.letGo;
 }
 
 function bindStick() {

@@ -102,7 +102,7 @@ export const RECORD_TEXTS = {
 
 /** Driving by hand. */
 export const DRIVE_TEXTS = {
-  override: PAGE_TEXTS.override, vetoed: "The advice gives no thrust ahead",
+  override: PAGE_TEXTS.override, vetoed: "The advice gives no thrust ahead", letGo: "Let go: zero thrust", ahead: "Ahead", astern: "Astern", port: "to port", starboard: "to starboard",
   overridden: (/** @type {string} */ seconds) => `Advice overridden, ${seconds} s left`,
 };
 

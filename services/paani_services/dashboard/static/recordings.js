@@ -41,7 +41,7 @@ function view(time) {
   return html`<div class="panel" tabindex="0" role="group" aria-label=${RECORDING_TEXTS.list}>
     <header><h2>${RECORDING_TEXTS.title}</h2><span id="recordings-sum" class="quiet">${folder && `${recordings.length + leftOut} ${RECORDING_TEXTS.in} ${folder}`}</span><button id="recordings-again" type="button" onClick=${() => void list()}>${RECORDING_TEXTS.again}</button></header>
     <p id="recordings-note" class="tab-note quiet" role="status" data-bad=${note.value.isBad}>${note.value.text}</p>
-    <table>${tableHead(RECORDING_TEXTS.columns, [2, 3])}<tbody id="recordings">${recordings.map((each) => row(time, each))}</tbody></table>
+    ${recordings.length > 0 && html`<table>${tableHead(RECORDING_TEXTS.columns, [2, 3])}<tbody id="recordings">${recordings.map((each) => row(time, each))}</tbody></table>`}
   </div>`;
 }
 
