@@ -9,7 +9,8 @@ from paani.arrays import F32, U8
 
 MEAN = np.array([0.485, 0.456, 0.406], np.float32)  # D7
 STD = np.array([0.229, 0.224, 0.225], np.float32)
-SIZE_WH = (320, 256)  # C1, D5
+SIZE_WH = (320, 256)  # of the segmenter, and of the paper's detector (C1, D5)
+DETECTOR_SIZE_WH = (416, 320)  # of the shipped detector: small and far things are lost for want of pixels
 PAD_GREY = 114  # grey level around a letterboxed picture, as YOLOX trains with
 IMAGE_QUALITY_MIDDLE_WH, IMAGE_QUALITY_WH = (320, 240), (160, 120)
 

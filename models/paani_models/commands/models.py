@@ -123,7 +123,7 @@ def _parser() -> argparse.ArgumentParser:
         "--mean-with", type=Path, metavar="FILE", help="detector: start from the mean of --start's weights and these"
     )
     train.add_argument("--draws", type=float, default=1.0, metavar="SHARE", help="detector: of an epoch's pictures")
-    train.add_argument("--size", metavar="HEIGHTxWIDTH", help="detector: of its input; 256x320 if not given")
+    train.add_argument("--size", metavar="HEIGHTxWIDTH", help="detector: of its input; 320x416 if not given")
     train.add_argument("--unchecked", action="store_true", help="gate: also on the sequences that choose its threshold")
     train.add_argument("--seed", type=int, metavar="N", help="segmenters only; 42 if not given")
     train.add_argument(

@@ -19,7 +19,7 @@ from paani_models.detector.distillation import Teacher
 from paani_models.detector.loss import detector_loss
 from paani_models.detector.metrics import Detections, class_figures, decode_boxes
 from paani_models.detector.shipped_network import FIRST_STAGES, Detector
-from paani_models.network_input import SIZE_WH, detector_batch
+from paani_models.network_input import DETECTOR_SIZE_WH, detector_batch
 from paani_models.training.augment import draw_null_picture
 from paani_models.training.training_state import (
     Prefetch,
@@ -72,8 +72,8 @@ class DetectorRecipe:
     draws_frac: float = 1.0  # of DRAWS_PER_EPOCH: shorter epochs, each of other pictures
     frozen: tuple[str, ...] = ()  # parts of the network that do not learn
     distilled: bool = False
-    height_px: int = SIZE_WH[1]  # of the network's input
-    width_px: int = SIZE_WH[0]
+    height_px: int = DETECTOR_SIZE_WH[1]  # of the network's input
+    width_px: int = DETECTOR_SIZE_WH[0]
 
     @property
     def size_wh(self) -> tuple[int, int]:

@@ -31,7 +31,7 @@ from paani_models.detector.paper_network import FUSED_PARAMETERS, Yolo11n
 from paani_models.detector.shipped_network import Detector, count_candidates
 from paani_models.engines.onnx_runner import open_network
 from paani_models.image_quality.network import ImageQualityNetwork
-from paani_models.network_input import IMAGE_QUALITY_WH, SIZE_WH
+from paani_models.network_input import DETECTOR_SIZE_WH, IMAGE_QUALITY_WH, SIZE_WH
 from paani_models.segmenter.paper_network import PaperSegmenter, parameter_count
 from paani_models.segmenter.shipped_network import ShippedSegmenter
 from paani_models.training.training_state import load_averaged_weights, load_checkpoint
@@ -63,8 +63,8 @@ CONTRACTS = {
         size_bytes=0,
         parameters=0,
         opset=OPSET,
-        input=Tensor("input", (1, 3, SIZE_WH[1], SIZE_WH[0])),
-        output=Tensor("candidates", (1, 8, count_candidates(*SIZE_WH[::-1]))),
+        input=Tensor("input", (1, 3, *DETECTOR_SIZE_WH[::-1])),
+        output=Tensor("candidates", (1, 8, count_candidates(*DETECTOR_SIZE_WH[::-1]))),
         classes=DETECTOR_CLASSES,
         preprocessing=Preprocessing("letterbox", _UNCHANGED, (1.0, 1.0, 1.0), pad_grey=114),
         architecture="YOLOX-nano shape, joint objectness and class scores",
@@ -99,7 +99,7 @@ def sized_detector(contract: Model, height_px: int, width_px: int) -> Model:
 
 
 CONTRACTS["yolo11n"] = msgspec.structs.replace(
-    CONTRACTS["detector"],
+    sized_detector(CONTRACTS["detector"], *SIZE_WH[::-1]),
     name="yolo11n",
     file="yolo11n.onnx",
     architecture="YOLO11n shape, independent implementation; not affiliated with its authors",

@@ -24,6 +24,7 @@ from paani_models.detector.train import DetectorRecipe, DetectorTraining
 from paani_models.detector.train_paper_network import Yolo11nRecipe, Yolo11nTraining
 from paani_models.image_quality.train import ImageQualityRecipe, ImageQualityTraining
 from paani_models.network_input import (
+    DETECTOR_SIZE_WH,
     SIZE_WH,
     detector_input,
     image_quality_input,
@@ -137,7 +138,7 @@ def _train_segmenter(net: str, pictures: PictureSelection, options: TrainingOpti
 
 
 def _train_detector(pictures: PictureSelection, options: TrainingOptions) -> None:
-    height_px, width_px = parse_size(options.size) if options.size else SIZE_WH[::-1]
+    height_px, width_px = parse_size(options.size) if options.size else DETECTOR_SIZE_WH[::-1]
     recipe = DetectorRecipe(height_px=height_px, width_px=width_px)
     keeps = options.blend is not None
     recipe = replace(

@@ -126,8 +126,8 @@ def probabilities() -> np.ndarray:
 
 
 def candidates(scale: float, score: float) -> np.ndarray:
-    boxes = np.random.default_rng(0).uniform(0.1, 1.0, (1, 4, 1680)) * scale
-    return np.concatenate((boxes, np.full((1, 4, 1680), score)), axis=1).astype(np.float32)
+    boxes = np.random.default_rng(0).uniform(0.1, 1.0, (1, 4, 2730)) * scale
+    return np.concatenate((boxes, np.full((1, 4, 2730), score)), axis=1).astype(np.float32)
 
 
 @pytest.mark.parametrize(
@@ -143,14 +143,14 @@ def test_outputs_that_are_not_of_the_contract(
     answer: np.ndarray, named: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "own.onnx"
-    save(path, answer, [1, 3, 256, 320])
+    save(path, answer, [1, 3, 256, 320] if answer.ndim == 4 else [1, 3, 320, 416])
     assert main(["models", "check", str(path)]) == 1
     assert named in capsys.readouterr().out
 
 
 def test_dynamic_axes_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "own.onnx"
-    save(path, candidates(200.0, 0.5), ["batch", 3, 256, 320])
+    save(path, candidates(200.0, 0.5), ["batch", 3, 320, 416])
     assert main(["models", "check", str(path)]) == 1
     assert "is not static" in capsys.readouterr().out
 
@@ -171,24 +171,24 @@ def test_files_that_are_no_models(tmp_path: Path, capsys: pytest.CaptureFixture[
 def test_a_detector_with_other_classes(tmp_path: Path) -> None:
     """Rows in another order, and rows that are left out: labels are those of the manifest."""
     path = tmp_path / "boats.onnx"
-    boxes = np.zeros((1, 6, 1680), np.float32)
+    boxes = np.zeros((1, 6, 2730), np.float32)
     boxes[0, :4, 0] = (160.0, 200.0, 80.0, 60.0)
     boxes[0, 4, 0], boxes[0, 5, 0] = 0.95, 0.8  # the left-out class scores higher
-    save(path, boxes, [1, 3, 256, 320])
+    save(path, boxes, [1, 3, 320, 416])
     shipped = load_catalogue()["detector"]
-    own = msgspec.structs.replace(shipped, file="boats.onnx", classes=("-", "vessel"), output=Tensor("o", (1, 6, 1680)))
+    own = msgspec.structs.replace(shipped, file="boats.onnx", classes=("-", "vessel"), output=Tensor("o", (1, 6, 2730)))
     save_catalogue({"boats": own}, tmp_path)
     evidence, _ = Perceiver(PerceptionConfig(detector=str(path)), stopwatch_ms).perceive(river(), HEADER, 0.0)
     assert [d.label for d in evidence.detections] == [m.Label.VESSEL]
     assert evidence.detections[0].confidence == pytest.approx(0.8, abs=1e-3)
 
 
-def detector_of(folder: Path, classes: tuple[str, ...], candidate_count: int = 1680) -> Path:
+def detector_of(folder: Path, classes: tuple[str, ...], candidate_count: int = 2730) -> Path:
     """A detector that finds nothing, with the manifest that declares its classes."""
     path = folder / "own.onnx"
     shape = (1, 4 + len(classes), candidate_count)
     answer = np.concatenate([np.full((1, 4, candidate_count), 150.0), np.zeros((1, len(classes), candidate_count))], 1)
-    save(path, answer.astype(np.float32), [1, 3, 256, 320])
+    save(path, answer.astype(np.float32), [1, 3, 320, 416])
     own = msgspec.structs.replace(
         load_catalogue()["detector"], file="own.onnx", classes=classes, output=Tensor("o", shape)
     )
@@ -204,7 +204,7 @@ def test_what_differs_in_a_detector_is_named(tmp_path: Path, capsys: pytest.Capt
     assert "warning  no class pier" in printed
     assert "classes in the order buoy, vessel, the shipped one has person, vessel, pier, buoy" in printed
     assert "1 of its classes are left out" in printed
-    assert "2100 candidates, strides 8, 16, 32 of 320x256 pixels give 1680" in printed
+    assert "2100 candidates, strides 8, 16, 32 of 416x320 pixels give 2730" in printed
 
 
 def test_nothing_differs_in_the_shipped_detector(capsys: pytest.CaptureFixture[str]) -> None:

@@ -19,7 +19,7 @@ onnx = pytest.importorskip("onnx", reason="needs the extra paani[train]")
 
 SHAPES = {
     "segmenter": ((1, 3, 256, 320), (1, 3, 256, 320)),
-    "detector": ((1, 3, 256, 320), (1, 8, 1680)),
+    "detector": ((1, 3, 320, 416), (1, 8, 2730)),
 }
 WATER = 0
 
@@ -36,11 +36,13 @@ def test_both_models_are_shipped_with_their_class_orders_c2_d6() -> None:
     assert catalogue["detector"].classes == ("person", "vessel", "pier", "buoy")
 
 
-def test_the_open_set_has_the_same_contracts_and_learnt_from_what_anyone_may_use() -> None:
+def test_the_open_set_has_the_same_contracts_but_for_the_detectors_size_and_learnt_from_what_anyone_may_use() -> None:
     shipped, chosen = load_catalogue(), load_catalogue(OPEN_WEIGHTS)
     assert set(chosen) == {"segmenter", "detector"}
+    assert [chosen["detector"].size_hw, shipped["detector"].size_hw] == [(256, 320), (320, 416)]
     for name, model in chosen.items():
-        same = ("file", "input", "output", "classes", "preprocessing", "parameters")
+        sized = ("input", "output") if name == "segmenter" else ()
+        same = ("file", "classes", "preprocessing", "parameters", *sized)
         assert [getattr(model, field) for field in same] == [getattr(shipped[name], field) for field in same]
         assert model.licence == OPEN_LICENCE != shipped[name].licence
         assert {origin.name for origin in model.origins} <= set(OPEN_TERMS)

@@ -32,7 +32,7 @@ Interp last 1 1 cells out0 0=2 1=4.0 2=4.0 6=0
 NO_BOXES = """7767517
 2 2
 Input in0 0 1 in0
-MemoryData boxes 0 1 out0 0=1680 1=8
+MemoryData boxes 0 1 out0 0=2730 1=8
 """
 PNNX = """#!{python}
 import pathlib, sys

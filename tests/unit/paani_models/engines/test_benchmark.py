@@ -35,9 +35,9 @@ def test_multiply_adds_by_hand(tmp_path: Path) -> None:
     assert count_multiply_adds(small_segmenter(tmp_path / "own.onnx")) == 3 * 256 * 320 * 3
 
 
-def test_a_frame_costs_less_than_half_of_the_papers_pair() -> None:
+def test_a_frame_costs_less_than_two_thirds_of_the_papers_pair() -> None:
     total = sum(count_multiply_adds(verified_path(role)) or 1e9 for role in PAPER_MULTIPLY_ADDS)
-    assert total < 0.5 * sum(PAPER_MULTIPLY_ADDS.values())
+    assert total < 2 / 3 * sum(PAPER_MULTIPLY_ADDS.values())
 
 
 def test_multiply_adds_need_a_readable_static_net(tmp_path: Path) -> None:
@@ -117,7 +117,7 @@ def test_bench_reports_why_ncnn_is_excluded(tmp_path: Path, capsys: pytest.Captu
 
 def test_bench_runs_both_engines(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     segmenter = place(small_segmenter(tmp_path / "segmenter.onnx"), CONVOLUTION, packed())
-    place(Path(shutil.copy(verified_path("detector"), tmp_path)), NO_BOXES, bytes(4 * 8 * 1680))
+    place(Path(shutil.copy(verified_path("detector"), tmp_path)), NO_BOXES, bytes(4 * 8 * 2730))
     catalogue = load_catalogue()
     own = msgspec.structs.replace(catalogue["segmenter"], sha256=file_sha256(segmenter))
     save_catalogue({"segmenter": own, "detector": catalogue["detector"]}, tmp_path)

@@ -52,7 +52,7 @@ def segmenter(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def detector(tmp_path: Path) -> Path:
-    return place(Path(shutil.copy(verified_path("detector"), tmp_path)), NO_BOXES, bytes(4 * 8 * 1680))
+    return place(Path(shutil.copy(verified_path("detector"), tmp_path)), NO_BOXES, bytes(4 * 8 * 2730))
 
 
 def test_outputs_of_both_engines_agree(segmenter: Path) -> None:
@@ -139,7 +139,7 @@ def test_files_of_another_model_are_refused(segmenter: Path) -> None:
         (CONVOLUTION, packed()[:20], "not the weights of"),
         (CONVOLUTION.replace("out0", "out1"), packed(), "does not run from in0 to out0"),
         (CONVOLUTION.replace("in0", "picture"), packed(), "does not run from in0 to out0"),
-        (NO_BOXES, bytes(4 * 8 * 1680), "must give"),
+        (NO_BOXES, bytes(4 * 8 * 2730), "must give"),
     ],
     ids=["text", "layer", "weights", "output", "input", "shape"],
 )
@@ -189,7 +189,7 @@ def test_convert_writes_what_the_engine_runs(tmp_path: Path, capsys: pytest.Capt
         (CONVOLUTION.replace("Convolution", "Tensor.slice"), packed(), 0, "own.onnx: ncnn has no Tensor.slice"),
         (CONVOLUTION, packed(WATER_BIAS + 0.002), 0, "answers differ by 2.0e-03"),
         (CONVOLUTION, packed(WATER_BIAS * np.float32(np.nan)), 0, "answers differ by inf"),
-        (NO_BOXES, bytes(4 * 8 * 1680), 0, "answers differ by inf"),
+        (NO_BOXES, bytes(4 * 8 * 2730), 0, "answers differ by inf"),
     ],
     ids=["failure", "layer", "difference", "not finite", "shape"],
 )

@@ -173,7 +173,7 @@ def test_the_papers_recipe_is_signed_per_tensor_qdq_t4(tmp_path: Path) -> None:
 
 def test_a_fully_quantised_detector_goes_blind_and_is_rejected(tmp_path: Path) -> None:
     """Boxes up to 320 and scores up to 1 share one step, of more than 1: scores are 0, or no scores."""
-    net, samples = verified_path("detector"), [detector_input(river(seed), (320, 256)) for seed in range(3)]
+    net, samples = verified_path("detector"), [detector_input(river(seed), (416, 320)) for seed in range(3)]
     quantise_network(net, tmp_path / "detector.onnx", RECIPES["paper"]["detector"], samples)
     blind, seeing = largest_score(tmp_path / "detector.onnx", samples), largest_score(net, samples)
     assert blind == 0.0 or blind > 1.0
@@ -184,7 +184,7 @@ def test_a_fully_quantised_detector_goes_blind_and_is_rejected(tmp_path: Path) -
 
 
 def test_with_its_decoding_in_float_the_detector_sees(tmp_path: Path) -> None:
-    net, samples = verified_path("detector"), [detector_input(river(seed), (320, 256)) for seed in range(3)]
+    net, samples = verified_path("detector"), [detector_input(river(seed), (416, 320)) for seed in range(3)]
     quantise_network(net, tmp_path / "detector.onnx", RECIPES["equalised"]["detector"], samples)
     assert largest_score(tmp_path / "detector.onnx", samples) > 0.5 * largest_score(net, samples)
     quantised = onnx.load(str(tmp_path / "detector.onnx"))

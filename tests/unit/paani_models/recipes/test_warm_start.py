@@ -14,6 +14,7 @@ from paani.errors import UserError  # noqa: E402
 from paani_models.catalogue import WEIGHTS  # noqa: E402
 from paani_models.detector.shipped_network import Detector  # noqa: E402
 from paani_models.engines.onnx_runner import open_network  # noqa: E402
+from paani_models.network_input import DETECTOR_SIZE_WH, SIZE_WH  # noqa: E402
 from paani_models.recipes.onnx_export import CONTRACTS, write_onnx  # noqa: E402
 from paani_models.recipes.warm_start import load_exported  # noqa: E402
 from paani_models.segmenter.paper_network import PaperSegmenter  # noqa: E402
@@ -22,8 +23,8 @@ from paani_models.segmenter.shipped_network import ShippedSegmenter  # noqa: E40
 pytestmark = pytest.mark.train
 
 
-def pictures(count: int) -> Tensor:
-    return torch.rand((count, 3, 256, 320), generator=torch.Generator().manual_seed(3))
+def pictures(count: int, size_wh: tuple[int, int] = SIZE_WH) -> Tensor:
+    return torch.rand((count, 3, *size_wh[::-1]), generator=torch.Generator().manual_seed(3))
 
 
 def trained(net: nn.Module) -> nn.Module:
@@ -68,7 +69,7 @@ def test_batch_statistics_start_close_to_the_stored_ones(tmp_path: Path) -> None
 
 
 def test_the_shipped_detector_loads_exactly() -> None:
-    loaded, x = Detector(), pictures(1)
+    loaded, x = Detector(), pictures(1, DETECTOR_SIZE_WH)
     load_exported(loaded, WEIGHTS / "detector.onnx", x)
     with torch.no_grad():
         ours = loaded.eval()(x).numpy()
