@@ -27,19 +27,24 @@ CLOCK, WALL = MonotonicClock(), WallClock()
 
 
 class Applied(msgspec.Struct, tag=True):
-    """`at_us`: when it was heard. Ages [ms] are those of the command in force, 0 without one."""
+    """`at_us`: when it was heard. Ages [ms] are those of the command in force, 0 without one.
+
+    `inhibits`: those of the newest thrust heard by then, why it moves nothing.
+    """
 
     at_us: int
     force_n: float
     cause: str
     command_age_ms: float
     picture_age_ms: float
+    inhibits: tuple[str, ...] = ()
 
 
 class Decided(msgspec.Struct, tag=True):
     """The first advisory from one picture."""
 
     at_us: int
+    direction: str = ""
 
 
 class Dropped(msgspec.Struct, tag=True):
@@ -61,8 +66,10 @@ class Listener:
         self._echo_us: dict[tuple[int, int], int] = {}
         self._newest_echo: dict[int, int] = {}
         self._evidence_us = 0
+        self._inhibits: tuple[str, ...] = ()
 
     def hear_thrust(self, thrust: m.Thrust) -> None:
+        self._inhibits = thrust.inhibits
         self._newest_echo[thrust.sent_us] = thrust.echo_us
         while len(self._newest_echo) > 256:
             del self._newest_echo[next(iter(self._newest_echo))]
@@ -78,13 +85,14 @@ class Listener:
                 cause=applied.zero_cause,
                 command_age_ms=(now_us - echo_us) * 1e-3 if in_force else 0.0,
                 picture_age_ms=(WALL.now_us() - applied.command_source_us) * 1e-3 if in_force else 0.0,
+                inhibits=self._inhibits,
             )
         )
 
     def hear_advisory(self, advisory: m.Advisory) -> None:
         if advisory.evidence_sent_us != self._evidence_us:
             self._evidence_us = advisory.evidence_sent_us
-            self.lines.put(Decided(CLOCK.now_us()))
+            self.lines.put(Decided(CLOCK.now_us(), advisory.direction))
 
     def hear_health(self, health: m.Health) -> None:
         drops = {drop.cause: drop.count for drop in health.drops}

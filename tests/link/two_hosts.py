@@ -54,7 +54,8 @@ class Drive:
             for name, process in (("board", self.board), ("host", self.host)):
                 assert process.poll() is None, f"the {name} ended: {(self.folder / f'{name}.out').read_text()}"
             if CLOCK.now_us() > deadline_us:
-                assert not what, f"not within {limit_s} s: {what}; {self.applied[-3:]} {self.output()}"
+                newest = f"{self.applied[-3:]}, {self.decided[-3:]}"
+                assert not what, f"not within {limit_s} s: {what}; {newest} {self.output()}"
                 return
             threading.Event().wait(0.02)
 

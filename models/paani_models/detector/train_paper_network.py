@@ -22,6 +22,7 @@ from paani_models.training.training_state import (
     TrainingState,
     append_record,
     learning_rate,
+    mixed_precision,
     to_device,
     training_device,
 )
@@ -106,7 +107,7 @@ class Yolo11nTraining:
         losses = []
         batches = Prefetch[Batch](recipe.workers, 2 * recipe.workers)(lambda i: self._batch(order, i, cv_seed), steps)
         for index, (pictures, truths, judged) in enumerate(tqdm(batches, f"epoch {epoch + 1}/{recipe.epochs}", steps)):
-            with torch.autocast(training_device().type, torch.bfloat16, enabled=training_device().type == "cuda"):  # S4
+            with mixed_precision():
                 boxes, bins, logits = self.model.raw(to_device(pictures))
             known = [truth.to(training_device()) for truth in truths]
             size = (recipe.side_px, recipe.side_px)
