@@ -13,7 +13,9 @@ from paani.undecodable import UNREADABLE
 from paani.whole_file import write_json
 
 WEIGHTS = Path(__file__).parent / "weights"
-OPEN_WEIGHTS = WEIGHTS / "open"  # a second set, learnt only from what anyone may use
+OPEN_WEIGHTS = WEIGHTS / "open"  # learnt only from what anyone may use
+PAPER_WEIGHTS = WEIGHTS / "paper"  # the paper's two networks, trained by its recipes
+OTHER_SETS = {"open": OPEN_WEIGHTS, "paper": PAPER_WEIGHTS}  # beside the full set, by the value of `perception.weights`
 MANIFEST = "manifest.json"
 
 

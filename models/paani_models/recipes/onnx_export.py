@@ -98,16 +98,13 @@ def sized_detector(contract: Model, height_px: int, width_px: int) -> Model:
     )
 
 
+# The paper's networks are exported as what they are for, so that a folder with both is a set of weights.
 CONTRACTS["yolo11n"] = msgspec.structs.replace(
     sized_detector(CONTRACTS["detector"], *SIZE_WH[::-1]),
-    name="yolo11n",
-    file="yolo11n.onnx",
     architecture="YOLO11n shape, independent implementation; not affiliated with its authors",
 )
 CONTRACTS["paper-segmenter"] = msgspec.structs.replace(
     CONTRACTS["segmenter"],
-    name="paper-segmenter",
-    file="paper-segmenter.onnx",
     architecture="MobileNetV3-Small encoder, 64-channel top-down decoder",
 )
 
@@ -147,7 +144,7 @@ def export_network(
     *,
     looks_at: tuple[int, int] | None = None,
 ) -> Model:
-    """Write `folder`/<name>.onnx and its manifest entry, both by renaming, and return the entry.
+    """Write the ONNX file into `folder` and its manifest entry, both by renaming, and return the entry.
 
     licence: that of the contract, which is for research, where not given.
     looks_at: height and width of the picture inside a segmenter whose training ended at that size.

@@ -11,7 +11,7 @@ import numpy as np
 import torch
 
 from paani.errors import UserError
-from paani_models.catalogue import WEIGHTS, verified_path
+from paani_models.catalogue import OTHER_SETS, PAPER_WEIGHTS, WEIGHTS, verified_path
 from paani_models.datasets.selection import PictureSelection
 from paani_models.datasets.sources import read_picture
 from paani_models.datasets.terms import OPEN_LICENCE, OPEN_TERMS
@@ -42,6 +42,8 @@ from paani_models.training.training_state import Stage, load_averaged_weights
 
 IMAGENET_FILE = "_weights/mobilenetv2_1.0_imagenet_folded_fp16.npz"
 COCO_FILE = "_weights/yolox_nano_coco.onnx"
+SHIPPED = [folder.resolve() for folder in (WEIGHTS, *OTHER_SETS.values())]
+PAPER_NETWORKS = ("paper-segmenter", "yolo11n")
 COMPARED_PICTURES = 8  # on which an exported network must agree with its checkpoint
 
 IMAGENET_RECIPE = SegmenterRecipe(stages=(Stage(12, 128, 160), Stage(12, 256, 320)), peak_rate=1e-3)
@@ -215,7 +217,7 @@ def _train_image_quality(pictures: PictureSelection, options: TrainingOptions) -
 
 def export_untrained_network(net: str, weights: Path) -> int:
     """Write the ONNX file and its manifest entry. Raises UserError rather than write among the shipped weights."""
-    if weights.resolve() == WEIGHTS.resolve():
+    if weights.resolve() in SHIPPED:
         raise UserError("--untrained: name a folder with --weights; the shipped nets stay")
     model = export_untrained(net, weights)
     sys.stdout.write(f"{weights / model.file}: {model.size_bytes} bytes, random weights\n")
@@ -233,8 +235,10 @@ def export_checkpoint(
     """Write the ONNX file and its manifest entry, with the provenance of the chosen sources.
 
     looks_at: `HEIGHTxWIDTH` of the picture inside a segmenter. Raises UserError where that is malformed, or the network
-    is none.
+    is none, and rather than put one of the paper's networks in the place of ours.
     """
+    if net in PAPER_NETWORKS and weights.resolve() == WEIGHTS.resolve():
+        raise UserError(f"--weights: {net} is not what ships there; the set `paper` lies in {PAPER_WEIGHTS}")
     inside = None
     if looks_at is not None:
         if "segmenter" not in net:

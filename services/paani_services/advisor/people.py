@@ -36,10 +36,10 @@ def people_in_lane(lane: str, obstacles: tuple[Obstacle, ...], config: Config) -
 def speed_limit_mps(obstacles: Iterable[Obstacle], config: Config) -> float | None:
     """The speed that must not be exceeded; None where the camera is calibrated and nobody is within `slow_m`.
 
-    By the open weights, which miss more, no advice is followed faster than by an uncalibrated camera.
+    By weights other than the full ones, which miss more, no advice is followed faster than by an uncalibrated camera.
     """
     people = config.advisor.people
-    limits_mps = [people.uncalibrated_mps] if config.perception.weights == "open" else []
+    limits_mps = [people.uncalibrated_mps] if config.perception.weights != "full" else []
     if not people.use:
         return min(limits_mps, default=None)
     center = lane_span("center", config.perception.corridors)

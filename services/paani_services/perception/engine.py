@@ -11,7 +11,7 @@ import numpy as np
 from paani.arrays import F32, U8
 from paani.config import EngineName, PerceptionConfig
 from paani.errors import UserError
-from paani_models.catalogue import OPEN_WEIGHTS, Model, choose_model, file_sha256, verified_path
+from paani_models.catalogue import OTHER_SETS, Model, choose_model, file_sha256, verified_path
 from paani_models.engines.last_resize import drop_last_resize
 from paani_services.perception.corridors import cell_shape
 from paani_services.perception.ncnn_engine import NcnnEngine
@@ -55,10 +55,10 @@ def engine_class(name: EngineName) -> type[Engine]:
 def network_path(role: str, config: PerceptionConfig) -> str:
     """The file of a role's network: the user's own, else that of the chosen set; empty for the one of the full set.
 
-    role: "detector" or "segmenter". Raises UserError naming a file of the open set that is missing or corrupt.
+    role: "detector" or "segmenter". Raises UserError naming a file of the set that is missing or corrupt.
     """
     own = config.detector if role == "detector" else config.segmenter
-    return own or ("" if config.weights == "full" else str(verified_path(role, OPEN_WEIGHTS)))
+    return own or ("" if config.weights == "full" else str(verified_path(role, OTHER_SETS[config.weights])))
 
 
 def load_network(role: str, config: PerceptionConfig, threads: int) -> Engine:

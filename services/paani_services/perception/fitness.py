@@ -8,7 +8,7 @@ from paani_services.perception.preprocessing import lookup_tables_for, shrink_pi
 
 
 def uses_fitness(perception: PerceptionConfig) -> bool:
-    """Whether the check asks the network: not where either is switched off, nor in the open set, which has none."""
+    """Whether the check asks the network: not where either is switched off, nor in a set that has none."""
     quality = perception.image_quality
     return quality.enabled and quality.min_fitness > 0.0 and bool(quality.model or perception.weights == "full")
 

@@ -22,6 +22,11 @@ from paani_services.perception.pipeline import Perceiver
 
 LOG = logging.getLogger(__name__)
 
+SEGMENTER_HAS_SEEN = {
+    "open": "its segmenter has never seen real water",
+    "paper": "its segmenter has seen a few pictures of open sea alone",
+}
+
 
 async def run(bus: Bus, clock: Clock, config: Config) -> None:
     """Process the newest picture at most `perception.rate_hz` times a second, in a thread beside the event loop."""
@@ -33,7 +38,7 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     await loop.run_in_executor(worker, release_freed_memory)  # what loading the networks took: some 15 MiB
     require_people_seen(perceiver, config)
     warn_uncalibrated(config)
-    judge_open_weights(config)
+    judge_weights(config)
     folder = await asyncio.to_thread(runtime_dir, config.bus)
     journal = Journal(folder / JOURNAL_FOLDER, round(config.perception.journal_max_mib * 2**20))
     period_us = patience_us(config.perception.rate_hz)
@@ -92,22 +97,24 @@ def warn_uncalibrated(config: Config) -> None:
         )
 
 
-def judge_open_weights(config: Config) -> None:
-    """Log what the open weights do worse, and how fast their advice may be followed.
+def judge_weights(config: Config) -> None:
+    """Log what weights other than the full ones do worse, and how fast their advice may be followed.
 
-    Raises UserError on a hull whose water they would tell: the open segmenter has seen rendered water alone.
+    Raises UserError on a hull whose water they would tell: their segmenters have seen too little real water.
     """
-    if config.perception.weights != "open":
+    weights = config.perception.weights
+    if weights == "full":
         return
     if config.bus.graph is Graph.HULL and not config.perception.segmenter:
         raise UserError(
-            "perception.weights open: its segmenter has never seen real water; a hull needs perception.segmenter, "
+            f"perception.weights {weights}: {SEGMENTER_HAS_SEEN[weights]}; a hull needs perception.segmenter, "
             "a file of your own, or perception.weights full"
         )
     LOG.warning(
-        "perception.weights is open: networks that have learnt from few pictures miss people and vessels that the "
+        "perception.weights is %s: networks that have learnt from few pictures miss people and vessels that the "
         "full set sees, most piers and buoys, and where water ends; no network says whether a picture is fit; "
-        "advice limits the speed (advisor.people.uncalibrated_mps); models/MODEL_CARD.md has the figures"
+        "advice limits the speed (advisor.people.uncalibrated_mps); models/MODEL_CARD.md has the figures",
+        weights,
     )
 
 
@@ -118,8 +125,8 @@ def sight_note(evidence: m.Evidence, config: Config) -> str:
     notes = []
     if not config.calibration.valid and config.perception.candidates.use:
         notes.append("uncalibrated camera, everybody counts as near, speed limited")
-    if config.perception.weights == "open":
-        notes.append("open weights, which miss more, speed limited")
+    if config.perception.weights != "full":
+        notes.append(f"{config.perception.weights} weights, which miss more, speed limited")
     return "; ".join((*notes, evidence.models))
 
 

@@ -10,7 +10,7 @@ from typing import Literal
 from paani.config.section import Fraction, NonNegative, Positive, Section, Size
 
 EngineName = Literal["onnxruntime", "ncnn"]
-WeightSet = Literal["full", "open"]
+WeightSet = Literal["full", "open", "paper"]
 
 
 class CameraConfig(Section, frozen=True):
@@ -115,8 +115,8 @@ class CorridorConfig(Section, frozen=True):
 
 class PerceptionConfig(Section, frozen=True):
     """`weights`: the set of the networks that have no path of their own: `full` has learnt from every source and is for
-    research; `open` has learnt from few that anyone may use, sees worse, and limits the speed as an uncalibrated
-    camera does.
+    research; `open` has learnt from few that anyone may use; `paper` has the paper's own networks by its recipes. The
+    last two see worse, and limit the speed as an uncalibrated camera does.
 
     `ego_polygon`: normalised corners of the own hull in the picture; what lies inside is no evidence.
 

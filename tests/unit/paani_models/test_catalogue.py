@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from paani.errors import UserError
-from paani_models.catalogue import OPEN_WEIGHTS, WEIGHTS, load_catalogue, verified_path
+from paani_models.catalogue import OPEN_WEIGHTS, PAPER_WEIGHTS, WEIGHTS, load_catalogue, verified_path
 from paani_models.commands.models import main
 from paani_models.datasets.terms import OPEN_LICENCE, OPEN_TERMS, states_open_terms
 from paani_models.detector.exported import open_detector
@@ -48,6 +48,16 @@ def test_the_open_set_has_the_same_contracts_but_for_the_detectors_size_and_lear
         assert {origin.name for origin in model.origins} <= set(OPEN_TERMS)
         assert all(states_open_terms(origin.licence, OPEN_TERMS[origin.name]) for origin in model.origins)
         assert verified_path(name, OPEN_WEIGHTS).stat().st_size == model.size_bytes
+
+
+def test_the_paper_set_has_the_papers_networks_in_the_shipped_ones_roles() -> None:
+    parameters = {"segmenter": 1_082_467, "detector": 2_582_932}  # D9, C12
+    shipped, chosen = load_catalogue(), load_catalogue(PAPER_WEIGHTS)
+    assert set(chosen) == {"segmenter", "detector"}
+    for name, model in chosen.items():
+        assert (model.classes, model.preprocessing) == (shipped[name].classes, shipped[name].preprocessing)
+        assert model.parameters == parameters[name]
+        assert verified_path(name, PAPER_WEIGHTS).stat().st_size == model.size_bytes
 
 
 @pytest.mark.parametrize("name", SHAPES)

@@ -19,7 +19,7 @@ from paani.errors import UserError
 from paani.option_numbers import whole_number
 from paani.option_paths import input_folder, output_file
 from paani.whole_file import write_json
-from paani_models.catalogue import verified_path
+from paani_models.catalogue import PAPER_WEIGHTS, verified_path
 from paani_services.perception.engine import network_path
 from paani_services.perception.picture_decoding import decode_picture
 from paani_tools.bench.eyes.drawn_scene import SIZE_WH, draw_scene
@@ -66,12 +66,6 @@ def main(argv: list[str]) -> int:
         metavar="FOLDER",
         help="also a pipeline with the detector*.onnx and segmenter*.onnx of a folder; may be repeated",
     )
-    parser.add_argument(
-        "--paper-pair",
-        type=input_folder("--paper-pair"),
-        metavar="FOLDER",
-        help="yolo11n.onnx and paper-segmenter.onnx",
-    )
     add_config_arguments(parser)
     options = parser.parse_args(argv)
     config = config_from(options)
@@ -83,7 +77,7 @@ def main(argv: list[str]) -> int:
     candidates = [_candidate(folder) for folder in options.others]
     held = _footprint(config)
     cores, load_before = os.cpu_count() or 1, os.getloadavg()[0]
-    timed = steps(config.perception, candidates, options.paper_pair, stopwatch_ms)
+    timed = steps(config.perception, candidates, stopwatch_ms)
     taken: dict[str, list[float]] = {}
     for turn, taken in measure_steps(  # noqa: B007 - the last one is the result
         timed, pictures, options.rounds, stopwatch_ms
@@ -102,7 +96,7 @@ def main(argv: list[str]) -> int:
         rows=found,
         ratios=ratios(found, candidates),
         footprint=held,
-        work=_work(config.perception, candidates, options.paper_pair),
+        work=_work(config.perception, candidates),
     )
     sys.stdout.write(text(report))
     if options.json:
@@ -181,7 +175,7 @@ def _footprint(config: Config) -> Footprint:
     return msgspec.json.decode(child.stdout, type=Footprint)
 
 
-def _work(config: PerceptionConfig, candidates: Sequence[Candidate], paper_pair: Path | None) -> tuple[Work, ...]:
+def _work(config: PerceptionConfig, candidates: Sequence[Candidate]) -> tuple[Work, ...]:
     given = {role: network_path(role, config) for role in ("detector", "segmenter")}
     used = {role: Path(path) if path else verified_path(role) for role, path in given.items()}
     found = [count_work("nets in use", used.values())]
@@ -190,8 +184,7 @@ def _work(config: PerceptionConfig, candidates: Sequence[Candidate], paper_pair:
         found.append(
             count_work(candidate.name, (Path(path) if path else verified_path(role) for role, path in other.items()))
         )
-    if paper_pair is not None:
-        found.append(count_work("paper's pair", (paper_pair / "yolo11n.onnx", paper_pair / "paper-segmenter.onnx")))
+    found.append(count_work("paper's pair", (verified_path(role, PAPER_WEIGHTS) for role in used)))
     return tuple(found)
 
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from itertools import count
-from pathlib import Path
 from time import sleep
 
 import msgspec
@@ -121,13 +120,9 @@ def ratios(found: Sequence[Row], candidates: Sequence[Candidate]) -> tuple[Ratio
 def steps(
     config: PerceptionConfig,
     candidates: Sequence[Candidate],
-    paper_pair: Path | None,
     stopwatch_ms: Callable[[], float],
 ) -> dict[str, Step]:
-    """What is timed, by name. Raises UserError for a model that cannot be used.
-
-    paper_pair: folder with a manifest of `yolo11n` and `paper-segmenter`.
-    """
+    """What is timed, by name. Raises UserError for a model that cannot be used."""
     found = _stages(config)
     bare = {threads: _bare(config, threads) for threads in (1, 2)}
     found |= {f"{BARE}, {threads} thread{'s' * (threads > 1)}": both for threads, both in bare.items()}
@@ -140,12 +135,9 @@ def steps(
         other = msgspec.structs.replace(config, detector=candidate.detector, segmenter=candidate.segmenter)
         found[f"{PIPELINE}, {candidate.name}"] = _pipeline(other, stopwatch_ms, concurrent=True, threads=1)
     found[PAPER_SHAPED] = _paper_shaped(config)
-    if paper_pair is not None:
-        pair = msgspec.structs.replace(
-            config, detector=str(paper_pair / "yolo11n.onnx"), segmenter=str(paper_pair / "paper-segmenter.onnx")
-        )
-        found[PAPER_PAIR] = _paper_shaped(pair)
-        found[f"{PIPELINE}, paper's pair"] = _pipeline(pair, stopwatch_ms, concurrent=True, threads=1)
+    pair = msgspec.structs.replace(config, weights="paper", detector="", segmenter="")
+    found[PAPER_PAIR] = _paper_shaped(pair)
+    found[f"{PIPELINE}, paper's pair"] = _pipeline(pair, stopwatch_ms, concurrent=True, threads=1)
     return found
 
 

@@ -298,14 +298,14 @@ def test_stops_when_no_epoch_is_better_s4(tmp_path: Path, monkeypatch: pytest.Mo
 def test_perception_runs_it_from_a_weights_folder(tmp_path: Path) -> None:
     """Any file of the contract, with the manifest that export writes beside it."""
     export_untrained("yolo11n", tmp_path)
-    model = load_catalogue(tmp_path)["yolo11n"]
+    model = load_catalogue(tmp_path)["detector"]
     assert model.parameters == FUSED_PARAMETERS
-    own = Perceiver(PerceptionConfig(detector=str(tmp_path / "yolo11n.onnx")), stopwatch_ms)
+    own = Perceiver(PerceptionConfig(detector=str(tmp_path / "detector.onnx")), stopwatch_ms)
     header = m.PictureHeader(source_us=1, frame_seq=0, frame_epoch=0, width_px=320, height_px=240)
     evidence, _ = own.perceive(river(), header, 0.0)
     assert evidence.usable
     assert f"detector {model.sha256[:12]}" in evidence.models
-    graph = onnx.load(str(tmp_path / "yolo11n.onnx"))
+    graph = onnx.load(str(tmp_path / "detector.onnx"))
     graph.opset_import[0].version = 99
     onnx.save(graph, str(tmp_path / "newer.onnx"))
     with pytest.raises(UserError, match=r"newer\.onnx: not an ONNX model that can run here"):

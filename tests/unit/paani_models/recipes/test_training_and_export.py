@@ -12,7 +12,7 @@ torch = pytest.importorskip("torch", reason="needs the extra paani[train]")
 onnx = pytest.importorskip("onnx", reason="needs the extra paani[train]")
 
 from paani.errors import UserError  # noqa: E402
-from paani_models.catalogue import verified_path  # noqa: E402
+from paani_models.catalogue import PAPER_WEIGHTS, WEIGHTS, verified_path  # noqa: E402
 from paani_models.commands.models import main  # noqa: E402
 from paani_models.detector import train as detector_train  # noqa: E402
 from paani_models.detector.data import BoxedPicture  # noqa: E402
@@ -295,6 +295,20 @@ def test_a_picture_inside_is_of_a_segmenter_and_of_whole_cells(
     where = ["--data", str(tmp_path), "--sources", "surf_people", "--checkpoint", "last.pt", "--weights", str(tmp_path)]
     assert main(["export", *words, *where]) == 2
     assert "--looks-at: detector" in (message := capsys.readouterr().err) or "multiples of 32" in message
+
+
+@pytest.mark.parametrize("net", ["paper-segmenter", "yolo11n"])
+def test_the_papers_networks_take_no_shipped_place(
+    net: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "surf_people").mkdir()
+    (tmp_path / "surf_people" / "manifest.json").write_text('{"items":[]}')
+    where = ["--data", str(tmp_path), "--sources", "surf_people"]
+    assert main(["export", net, "--checkpoint", "last.pt", *where]) == 2
+    assert f"--weights: {net} is not what ships there" in capsys.readouterr().err
+    for folder in (WEIGHTS, PAPER_WEIGHTS):
+        assert main(["export", net, "--untrained", *where, "--weights", str(folder)]) == 2
+        assert "the shipped nets stay" in capsys.readouterr().err
 
 
 def test_the_paper_segmenters_file_has_the_papers_size_d10(tmp_path: Path) -> None:

@@ -351,10 +351,12 @@ def test_an_uncalibrated_camera_is_never_followed_fast(slow_mps: float, uncalibr
     assert play([CLEAR], measured)[1][0].speed_limit_mps is msgspec.UNSET
 
 
-@given(FRAMES, st.booleans())
-def test_by_the_open_weights_no_advice_is_followed_fast(frame: m.Evidence, is_paper: bool) -> None:
+@given(FRAMES, st.booleans(), st.sampled_from(["open", "paper"]))
+def test_by_weights_that_are_not_the_full_ones_no_advice_is_followed_fast(
+    frame: m.Evidence, is_paper: bool, weights: str
+) -> None:
     config = PAPER if is_paper else CALIBRATED
-    chosen = msgspec.structs.replace(config, perception=msgspec.structs.replace(config.perception, weights="open"))
+    chosen = msgspec.structs.replace(config, perception=msgspec.structs.replace(config.perception, weights=weights))
     advisory = play([frame], chosen)[1][0]
     assert isinstance(advisory.speed_limit_mps, float)
     assert advisory.speed_limit_mps <= PAANI.advisor.people.uncalibrated_mps

@@ -17,8 +17,9 @@ import pytest
 from paani import messages as m
 from paani.clock import stopwatch_ms
 from paani.config import PerceptionConfig, load_config
+from paani.config.perception import WeightSet
 from paani.errors import UserError
-from paani_models.catalogue import OPEN_WEIGHTS, load_catalogue, verified_path
+from paani_models.catalogue import OTHER_SETS, load_catalogue, verified_path
 from paani_services.perception.engine import OnnxEngine, network_path
 from paani_services.perception.fitness import load_fitness
 from paani_services.perception.pipeline import Perceiver
@@ -157,27 +158,29 @@ def test_f2_without_a_segmenter() -> None:
     assert mask is not None
 
 
-def test_the_open_set_sees_by_its_own_networks_and_a_file_of_ones_own_goes_before() -> None:
-    open_set = load_catalogue(OPEN_WEIGHTS)
-    names = [f"{role} {open_set[role].sha256[:12]}" for role in ("detector", "segmenter")]
-    eyes = perceiver(PerceptionConfig(weights="open"))
+@pytest.mark.parametrize("weights", ["open", "paper"])
+def test_another_set_sees_by_its_own_networks_and_a_file_of_ones_own_goes_before(weights: WeightSet) -> None:
+    other = load_catalogue(OTHER_SETS[weights])
+    names = [f"{role} {other[role].sha256[:12]}" for role in ("detector", "segmenter")]
+    eyes = perceiver(PerceptionConfig(weights=weights))
     evidence, _ = eyes.perceive(river(), HEADER, 0.0)
     eyes.close()
     assert evidence.usable
     assert evidence.models == ", ".join(names)
-    assert {role: open_set[role].sha256 for role in open_set}.items().isdisjoint(
+    assert {role: other[role].sha256 for role in other}.items().isdisjoint(
         {role: model.sha256 for role, model in load_catalogue().items()}.items()
     )
     own = str(verified_path("segmenter"))
-    assert network_path("segmenter", PerceptionConfig(weights="open", segmenter=own)) == own
+    assert network_path("segmenter", PerceptionConfig(weights=weights, segmenter=own)) == own
     assert network_path("detector", PerceptionConfig()) == ""
 
 
-def test_no_network_of_other_terms_says_whether_a_picture_is_fit_beside_the_open_set() -> None:
+@pytest.mark.parametrize("weights", ["open", "paper"])
+def test_no_network_of_the_full_set_says_whether_a_picture_is_fit_beside_another(weights: WeightSet) -> None:
     assert load_fitness(PerceptionConfig(), 1) is not None
-    assert load_fitness(PerceptionConfig(weights="open"), 1) is None
+    assert load_fitness(PerceptionConfig(weights=weights), 1) is None
     own = msgspec.structs.replace(PerceptionConfig().image_quality, model=str(verified_path("gate")))
-    assert load_fitness(PerceptionConfig(weights="open", image_quality=own), 1) is not None
+    assert load_fitness(PerceptionConfig(weights=weights, image_quality=own), 1) is not None
 
 
 def test_a_missing_or_corrupt_model_is_the_users_to_mend(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 from paani import messages as m
 from paani.config import calibration_of, load_config
 from paani.errors import UserError
-from paani_services.perception.service import judge_open_weights, sight_note, warn_uncalibrated
+from paani_services.perception.service import judge_weights, sight_note, warn_uncalibrated
 
 ASSUMED, PAPER = load_config(), load_config(profile="paper")
 MEASURED = msgspec.structs.replace(ASSUMED, calibration=calibration_of(ASSUMED.eye))
@@ -30,24 +30,28 @@ def test_the_log_says_what_is_assumed_and_what_measures_it(caplog: pytest.LogCap
     assert "`paani calibrate RECORDING`" in caplog.messages[0]
 
 
-def test_the_log_and_the_page_say_that_the_weights_are_the_open_ones(caplog: pytest.LogCaptureFixture) -> None:
-    chosen = load_config(sets=("perception.weights=open",))
+@pytest.mark.parametrize("weights", ["open", "paper"])
+def test_the_log_and_the_page_say_that_the_weights_are_others(weights: str, caplog: pytest.LogCaptureFixture) -> None:
+    chosen = load_config(sets=(f"perception.weights={weights}",))
     with caplog.at_level(logging.WARNING):
         for config in (MEASURED, PAPER):
-            judge_open_weights(config)
+            judge_weights(config)
         assert caplog.messages == []
-        judge_open_weights(chosen)
+        judge_weights(chosen)
     assert "learnt from few pictures" in caplog.messages[0]
     assert "advisor.people.uncalibrated_mps" in caplog.messages[0]
-    assert sight_note(SEEN, chosen).endswith("; open weights, which miss more, speed limited; one, other")
+    assert sight_note(SEEN, chosen).endswith(f"; {weights} weights, which miss more, speed limited; one, other")
 
 
-def test_a_hull_is_not_steered_by_a_segmenter_that_has_never_seen_real_water(caplog: pytest.LogCaptureFixture) -> None:
-    sets = ["perception.weights=open"]
-    with pytest.raises(UserError, match=r"perception\.weights open: .* perception\.segmenter"):
-        judge_open_weights(load_config(profile="hull", sets=sets))
+@pytest.mark.parametrize("weights", ["open", "paper"])
+def test_a_hull_is_not_steered_by_a_segmenter_that_has_seen_little_water(
+    weights: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    sets = [f"perception.weights={weights}"]
+    with pytest.raises(UserError, match=rf"perception\.weights {weights}: .* perception\.segmenter"):
+        judge_weights(load_config(profile="hull", sets=sets))
     with caplog.at_level(logging.WARNING):
-        judge_open_weights(load_config(profile="hull", sets=[*sets, "perception.segmenter=own.onnx"]))
+        judge_weights(load_config(profile="hull", sets=[*sets, "perception.segmenter=own.onnx"]))
     assert "people" in caplog.messages[0]
 
 
