@@ -32,7 +32,7 @@ RESULTS_ALONE = {
     "bench": "board bridge chain eyes fleet judgement recorder soak",
     "browser": """
         exposed_page heading_verdicts indicator_strip installed legibility map_projection map_tiles models_report
-        recording_chip recordings_tab replay_page route_editor sensor_strip tuning_strip
+        recording_chip recordings_tab replay_page route_editor sensor_strip sizes tuning_strip
     """,
     "integration": """
         authority_matrix certificates claims_check cluster docs doctor examples inspect package replay stuck_detection
@@ -40,6 +40,7 @@ RESULTS_ALONE = {
     """,
 }  # by folder, the files that wait for results and do not watch the clock
 BESIDE = {f"tests/{folder}/test_{name}.py" for folder, names in RESULTS_ALONE.items() for name in names.split()}
+SOAK = "tests/bench/test_soak.py"  # sits out its minutes in a worker of its own, where there is a third
 STOPS_THE_BOAT = {"fault", "link"}  # folders
 WORKER = "PYTEST_XDIST_WORKER" in os.environ  # other tests run at the same time
 NICENESS = 5
@@ -73,7 +74,7 @@ def is_whole_run(config: pytest.Config) -> bool:
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """In a whole run what starts processes gets a second try, which the summary tells; what stops the boat not."""
-    items.sort(key=lambda item: not is_alone(item.nodeid))
+    items.sort(key=lambda item: (not is_alone(item.nodeid), not item.nodeid.startswith(SOAK)))
     if is_whole_run(config):
         for item in items:
             if item.nodeid.split("/")[1] in ALONE - STOPS_THE_BOAT:
@@ -82,12 +83,21 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    """One worker has all that watches the clock, one test after the other; the rest is shared out file by file."""
+    """One worker has all that watches the clock, one test after the other; the rest is shared out file by file.
+
+    Of three workers one has the soak and then ends, so that only two compute.
+    """
     from xdist.scheduler import LoadScopeScheduling  # noqa: PLC0415  a single process does without it
 
     class AloneFirst(LoadScopeScheduling):  # type: ignore[misc]  # xdist has no types
         def _split_scope(self, nodeid: str) -> str:
             return "alone" if is_alone(nodeid) else nodeid.partition("::")[0]
+
+        def _reschedule(self, node: Any) -> None:
+            if self.numnodes > 2 and SOAK in self.assigned_work[node]:
+                node.shutdown()  # after what it has
+            else:
+                super()._reschedule(node)
 
     config.option.loadscopereorder = False
     return AloneFirst(config, log)
