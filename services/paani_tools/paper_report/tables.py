@@ -26,23 +26,26 @@ from paani_tools.paper_report.stills import advice_when_stale, evidence_of, last
 COLUMNS = ("statement", "figure", "paper", "here", "n", "what differs")
 OTHER_DATA = (
     "The data differ: the paper's WaterScenes pictures are not at hand. Here stand held-out sequences of other sources "
-    "and rendered pictures, judged on the ONNX file that ships, which is neither of the paper's networks."
+    "and rendered pictures."
 )
 OTHER_MASKS = (
-    "The data differ: of the paper's 198 validation pictures of MaSTr1325 here stand those that could be recovered, "
-    "judged on the ONNX file that ships. `paani models train paper-segmenter` trains the paper's network."
+    "The data differ: of the paper's 198 validation pictures of MaSTr1325 here stand those that could be recovered."
 )
+SHIPPED = "what ships"
+TRAINED = "the paper's, trained here"
 BANDED = "recovered masks leave a band between the classes undecided, so that edges are not scored"
-OTHER_NETWORK = "another network ships"
-BANDED_NOTE = f"On held-out pictures; {BANDED}."
+INT8_NOTE = "What ships is FP32: INT8 has to pass an acceptance test (`paani models quantise`)."
 PAPER_SEGMENTER = "paper-segmenter"
 NO_COUNTERPART = "no second artifact and no test split here"
 MASK_SOURCE = "mastr1325"
 BLACK = m.UnusableCause.BLACK
 
 
-def detector_table(detector: Model) -> FigureTable:
-    """Average precision by class, on the paper's validation pictures where not said otherwise."""
+def detector_table(detector: Model, whose: str) -> FigureTable:
+    """Average precision by class, on the paper's validation pictures where not said otherwise.
+
+    whose: what the heading says of the network.
+    """
     rows = [_precision_row(detector, "V1", "AP50, mean", published.DETECTOR_AP50, "mean", "ap50")]
     for name, paper in published.DETECTOR_VALIDATION.items():
         rows.append(
@@ -50,52 +53,47 @@ def detector_table(detector: Model) -> FigureTable:
         )
     for statement, what, printed in published.DETECTOR_OTHERS:
         rows.append((statement, what, printed, None, 0, NO_COUNTERPART))
-    return FigureTable(name="Detector", columns=COLUMNS, rows=tuple(rows), note=OTHER_DATA)
+    return FigureTable(name=f"Detector: {whose}", columns=COLUMNS, rows=tuple(rows), note=OTHER_DATA)
 
 
-def network_table(detector: Model, segmenter: Model) -> FigureTable:
-    """Size of the networks, and what the export changed."""
+def network_table(detector: Model, segmenter: Model, whose: str) -> FigureTable:
+    """Size of the networks, and what the export changed. whose: as for `detector_table`."""
     rows: list[tuple[str, str, Cell, Cell, int, str]] = []
     for model, paper in ((detector, published.DETECTOR_NETWORK), (segmenter, published.SEGMENTER_NETWORK)):
         statements, parameters, megabytes, difference = paper
         network = model.architecture
         rows += [
             (statements[0], f"{model.name}, parameters", f"{parameters:,}", f"{model.parameters:,}", 1, network),
-            (statements[1], f"{model.name}, file [MB]", megabytes, model.size_bytes * 1e-6, 1, OTHER_NETWORK),
+            (statements[1], f"{model.name}, file [MB]", megabytes, model.size_bytes * 1e-6, 1, network),
             ("T2", f"{model.name}, export, largest difference", difference, _small(model.export_max_abs_diff), 1,
-             f"{OTHER_NETWORK}; 1e-3 is the limit of both"),
+             "1e-3 is the limit of both"),
         ]  # fmt: skip
-    return FigureTable(name="Networks", columns=COLUMNS, rows=tuple(rows))
+    return FigureTable(name=f"Networks: {whose}", columns=COLUMNS, rows=tuple(rows))
 
 
-def segmenter_table(segmenter: Model) -> FigureTable:
-    """Intersection over union by class, and F1 of the water's edge."""
+def segmenter_table(segmenter: Model, whose: str) -> FigureTable:
+    """Intersection over union by class, and F1 of the water's edge. whose: as for `detector_table`."""
     rows = []
     for statement, paper_figures in (("V8", published.SEGMENTER), ("V9", published.SEGMENTER_ONNX)):
         for metric, paper in paper_figures.items():
             found = _figure(segmenter.figures, metric, MASK_SOURCE) if statement == "V9" else None
             here, n = (found.value, found.n) if found else (None, 0)
-            why = "what ships is an ONNX file" if statement == "V8" else "24 of its pictures" if found else BANDED
+            why = "the ONNX file was judged" if statement == "V8" else "24 of its pictures" if found else BANDED
             words = published.SEGMENTER_WORDS[metric]
             rows.append((statement, f"{words}, {published.ARTIFACTS[statement]}", paper, here, n, why))
-    for metric, paper in published.INT8.items():
-        why = "what ships is FP32: INT8 has to pass an acceptance test (`paani models quantise`)"
-        rows.append(("V10", f"{published.SEGMENTER_WORDS[metric]}, INT8", paper, None, 0, why))
-    return FigureTable(name="Segmenter", columns=COLUMNS, rows=tuple(rows), note=OTHER_MASKS)
+    return FigureTable(name=f"Segmenter: {whose}", columns=COLUMNS, rows=tuple(rows), note=OTHER_MASKS)
 
 
-def trained_table(experiments: Sequence[Experiment]) -> FigureTable:
-    """What the paper's segmenter reached where its recipe was followed on the pictures that there are."""
-    rows: list[tuple[str, str, Cell, Cell, int, str]] = []
-    for experiment in (each for each in experiments if each.net == PAPER_SEGMENTER):
-        statement, paper = ("V10", published.INT8) if experiment.inference else ("V9", published.SEGMENTER_ONNX)
-        artifact = "INT8" if experiment.inference else published.ARTIFACTS["V9"]
-        rows += [
-            (statement, f"{published.SEGMENTER_WORDS[found.metric]}, {artifact}", paper[found.metric], found.value,
-             found.n, experiment.recipe)
-            for found in experiment.figures
-        ]  # fmt: skip
-    return FigureTable(name="The paper's segmenter, trained here", columns=COLUMNS, rows=tuple(rows), note=BANDED_NOTE)
+def quantised_table(experiments: Sequence[Experiment]) -> FigureTable:
+    """What the paper's segmenter, trained here, keeps as INT8 by the paper's recipe."""
+    rows = tuple(
+        ("V10", f"{published.SEGMENTER_WORDS[found.metric]}, INT8", published.INT8[found.metric], found.value, found.n,
+         experiment.recipe)
+        for experiment in experiments
+        if experiment.net == PAPER_SEGMENTER and experiment.inference
+        for found in experiment.figures
+    )  # fmt: skip
+    return FigureTable(name=f"INT8: {TRAINED}", columns=COLUMNS, rows=rows, note=INT8_NOTE)
 
 
 def settings_table(paper: Config, ours: Config) -> FigureTable:
@@ -177,7 +175,7 @@ def _precision_row(
     wanted = published.DETECTOR_CLASSES if name == "mean" else (name,)
     found = [each for label in wanted if (each := _figure(detector.figures, f"{label}_{metric}"))]
     drawn = sum(each.n for label in wanted if (each := _figure(detector.figures, f"{label}_{metric}", RENDERED)))
-    here, n = fmean(each.value for each in found), sum(each.n for each in found)
+    here, n = fmean(each.value for each in found) if found else None, sum(each.n for each in found)
     return statement, what, paper, here, n, f"{drawn} of these boxes are rendered"
 
 

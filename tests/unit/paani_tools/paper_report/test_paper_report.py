@@ -11,7 +11,7 @@ import pytest
 
 from paani.cli import main as paani
 from paani.config import load_config
-from paani_models.catalogue import WEIGHTS, Figure, load_catalogue
+from paani_models.catalogue import PAPER_WEIGHTS, WEIGHTS, Figure, load_catalogue
 from paani_models.report.experiments import Experiment, read_experiments
 from paani_tools.claims.statements import read_statements
 from paani_tools.paper_report import published
@@ -19,13 +19,15 @@ from paani_tools.paper_report.command import markdown, report_text
 from paani_tools.paper_report.recipes import DETECTOR, SEGMENTER, training_table
 from paani_tools.paper_report.settings import BOAT, RUNTIME
 from paani_tools.paper_report.tables import (
+    SHIPPED,
+    TRAINED,
     board_tables,
     detector_table,
     network_table,
+    quantised_table,
     segmenter_table,
     settings_table,
     stills_table,
-    trained_table,
     world_table,
 )
 from tests.unit.paani_tools.bench.board.test_board_figures import polls, run_of
@@ -91,37 +93,41 @@ def test_figures_of_networks_are_the_manifests() -> None:
     catalogue = load_catalogue()
     detector, segmenter = catalogue["detector"], catalogue["segmenter"]
     figures = {(each.metric, each.source): each for each in (*detector.figures, *segmenter.figures)}
-    here = dict(zip(column(detector_table(detector), "figure"), column(detector_table(detector), "here"), strict=True))
+    table = detector_table(detector, SHIPPED)
+    here = dict(zip(column(table, "figure"), column(table, "here"), strict=True))
     assert here["AP50-95, buoy"] == figures["buoy_ap50_95", "all"].value
     four = [figures[f"{name}_ap50_95", "all"].value for name in CLASSES]
     assert here["AP50-95, mean"] == pytest.approx(sum(four) / 4)
-    found = dict(
-        zip(column(segmenter_table(segmenter), "figure"), column(segmenter_table(segmenter), "here"), strict=True)
-    )
+    masks = segmenter_table(segmenter, SHIPPED)
+    found = dict(zip(column(masks, "figure"), column(masks, "here"), strict=True))
     assert found["IoU of water, ONNX"] == figures["iou_water", "mastr1325"].value
-    assert (found["IoU of water, PyTorch"], found["F1 of edges, ONNX"], found["mean IoU, INT8"]) == (None, None, None)
+    assert (found["IoU of water, PyTorch"], found["F1 of edges, ONNX"]) == (None, None)
     assert here["AP50, mean"] == pytest.approx(0.25 * sum(figures[f"{name}_ap50", "all"].value for name in CLASSES))
-    why = dict(
-        zip(column(detector_table(detector), "figure"), column(detector_table(detector), "what differs"), strict=True)
-    )
+    why = dict(zip(column(table, "figure"), column(table, "what differs"), strict=True))
     assert why["AP50-95, buoy"] == f"{figures['buoy_ap50_95', 'rendered'].n} of these boxes are rendered"
-    sizes = column(network_table(detector, segmenter), "here")
+    sizes = column(network_table(detector, segmenter, SHIPPED), "here")
     assert sizes[:2] == [f"{detector.parameters:,}", detector.size_bytes * 1e-6]
     assert sizes[5] == f"{segmenter.export_max_abs_diff:.2e}"
 
 
-def test_a_training_by_the_papers_recipe_stands_beside_the_papers_figures() -> None:
-    reached = Figure("miou", "mastr1325", 0.9, 24)
-    trained = Experiment("paper-segmenter", "0", "eighty pictures", (reached,))
+def test_the_papers_networks_trained_here_stand_beside_the_papers_figures() -> None:
+    trained = load_catalogue(PAPER_WEIGHTS)
+    table = network_table(trained["detector"], trained["segmenter"], TRAINED)
+    paper, here = column(table, "paper"), column(table, "here")
+    assert [here[0], here[3]] == [paper[0], paper[3]]  # parameters
+    assert [here[1], here[4]] == pytest.approx([paper[1], paper[4]], rel=0.007)  # megabytes
+    report = report_text(None)
+    for part in (detector_table(trained["detector"], TRAINED), segmenter_table(trained["segmenter"], TRAINED), table):
+        assert markdown(part) in report
+        assert TRAINED in part.name
+
+
+def test_int8_of_the_papers_segmenter_stands_beside_the_papers_figures() -> None:
+    trained = Experiment("paper-segmenter", "0", "eighty pictures", (Figure("miou", "mastr1325", 0.9, 24),))
     quantised = msgspec.structs.replace(trained, figures=(Figure("miou", "mastr1325", 0.8, 24),), inference="INT8")
-    table = trained_table((msgspec.structs.replace(trained, net="segmenter"), trained, quantised))
-    assert table.rows == (
-        ("V9", "mean IoU, ONNX", published.SEGMENTER_ONNX["miou"], 0.9, 24, "eighty pictures"),
-        ("V10", "mean IoU, INT8", published.INT8["miou"], 0.8, 24, "eighty pictures"),
-    )
-    shipped = trained_table(read_experiments(WEIGHTS))
-    assert {"V9", "V10"} == set(column(shipped, "statement"))
-    assert shipped.name in report_text(None)
+    table = quantised_table((msgspec.structs.replace(quantised, net="segmenter"), trained, quantised))
+    assert table.rows == (("V10", "mean IoU, INT8", published.INT8["miou"], 0.8, 24, "eighty pictures"),)
+    assert markdown(quantised_table(read_experiments(WEIGHTS))) in report_text(None)
 
 
 def test_the_paper_profile_has_the_constants_of_the_papers_tables() -> None:
@@ -155,11 +161,12 @@ def test_the_report_is_one_page_of_tables(tmp_path: Path) -> None:
     text = file.read_text(encoding="utf-8")
     assert text == report_text(None)
     assert [line for line in text.splitlines() if line.startswith("## ")] == [
-        "## Networks", "## Detector", "## Segmenter", "## The paper's segmenter, trained here",
+        *(f"## {what}: {whose}" for what in ("Networks", "Detector", "Segmenter") for whose in (SHIPPED, TRAINED)),
+        f"## INT8: {TRAINED}",
         "## Single pictures, paper profile", "## Constants, paper profile", "## World, paper profile",
         "## Training, the paper's recipes", "## Board protocol",
     ]  # fmt: skip
-    assert "| V10 | mean IoU, INT8 | 0.7303 | - |" in text
+    assert "| V10 | mean IoU, INT8 | 0.7303 | 0.8877 | 24 |" in text
     assert markdown(board_tables(None)).count("| - | 0 |") == 7
 
 
