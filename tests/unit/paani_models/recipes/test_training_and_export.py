@@ -17,7 +17,7 @@ from paani_models.commands.models import main  # noqa: E402
 from paani_models.detector import train as detector_train  # noqa: E402
 from paani_models.detector.data import BoxedPicture  # noqa: E402
 from paani_models.detector.shipped_network import Detector  # noqa: E402
-from paani_models.network_input import segmenter_batch  # noqa: E402
+from paani_models.network_input import segmenter_batch, segmenter_input  # noqa: E402
 from paani_models.recipes.onnx_export import (  # noqa: E402
     CONTRACTS,
     SmallerInside,
@@ -27,6 +27,7 @@ from paani_models.recipes.onnx_export import (  # noqa: E402
     write_onnx,
 )
 from paani_models.recipes.train_and_export import TrainingOptions, parse_size, parse_stages, start_detector  # noqa: E402
+from paani_models.recipes.warm_start import load_exported  # noqa: E402
 from paani_models.segmenter import train as segmenter_train  # noqa: E402
 from paani_models.segmenter.paper_augmentation import augment_paper_pair  # noqa: E402
 from paani_models.segmenter.paper_network import DECODER_CHANNELS, PaperSegmenter  # noqa: E402
@@ -41,6 +42,7 @@ from paani_models.training.training_state import (  # noqa: E402
     save_checkpoint,
     stage_at_epoch,
 )
+from tests import pictures  # noqa: E402
 
 pytestmark = pytest.mark.train
 
@@ -321,6 +323,14 @@ def test_the_paper_segmenters_file_has_the_papers_size_d10(tmp_path: Path) -> No
     segmenter, detector = ((tmp_path / f"{name}.onnx").stat().st_size for name in ("segmenter", "detector"))
     assert segmenter == pytest.approx(4_344_661, rel=0.007)
     assert segmenter + detector == pytest.approx(14_817_168, rel=0.007)
+
+
+def test_the_papers_segmenter_says_the_same_in_pytorch_as_in_its_file_v8() -> None:
+    file = verified_path("segmenter", PAPER_WEIGHTS)
+    inputs = [segmenter_input(pictures.river(seed)) for seed in range(4)]
+    net = PaperSegmenter()
+    load_exported(net, file, torch.from_numpy(np.concatenate(inputs)))
+    assert largest_export_difference(net.eval(), file, inputs) < 1e-3
 
 
 def test_export_notices_other_weights(tmp_path: Path) -> None:

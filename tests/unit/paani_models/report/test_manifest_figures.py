@@ -1,8 +1,10 @@
 """The manifest's figures, measured again on part of the held-out pictures (T3, U1 - U4)."""
 
+from pathlib import Path
+
 import pytest
 
-from paani_models.catalogue import Figure, load_catalogue, verified_path
+from paani_models.catalogue import PAPER_WEIGHTS, WEIGHTS, Figure, load_catalogue, verified_path
 from paani_models.commands.models import data_folder
 from paani_models.datasets.sources import Sample, choose_sources, read_samples
 from paani_models.report.manifest_figures import (
@@ -19,8 +21,8 @@ needs_data = pytest.mark.skipif(
 )
 
 
-def recorded(net: str, source: str) -> dict[str, Figure]:
-    return {figure.metric: figure for figure in load_catalogue()[net].figures if figure.source == source}
+def recorded(net: str, source: str, weights: Path = WEIGHTS) -> dict[str, Figure]:
+    return {figure.metric: figure for figure in load_catalogue(weights)[net].figures if figure.source == source}
 
 
 def held_out(*names: str) -> list[Sample]:
@@ -35,6 +37,17 @@ def test_segmenter_figures_are_reproduced_t3_u3_u4() -> None:
     assert set(measured) == {"iou_water", "iou_obstacle", "iou_sky", "miou"} == set(expected)
     for metric, figure in measured.items():
         assert figure.value == pytest.approx(expected[metric].value, abs=0.005)
+
+
+@pytest.mark.data
+@needs_data
+def test_the_papers_segmenter_trained_here_has_the_stated_figures_v9() -> None:
+    measured = measure_segmenter(verified_path("segmenter", PAPER_WEIGHTS), held_out("mastr1325"))
+    found = {figure.metric: figure.value for figure in measured if figure.source == "mastr1325"}
+    stated = {"miou": 0.886, "iou_water": 0.946, "iou_obstacle": 0.722, "iou_sky": 0.989}
+    assert found == pytest.approx(stated, abs=0.002)
+    expected = recorded("segmenter", "mastr1325", PAPER_WEIGHTS)
+    assert {metric: figure.value for metric, figure in expected.items()} == pytest.approx(stated, abs=0.002)
 
 
 @pytest.mark.data
