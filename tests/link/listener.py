@@ -45,6 +45,7 @@ class Decided(msgspec.Struct, tag=True):
 
     at_us: int
     direction: str = ""
+    reason: str = ""
 
 
 class Dropped(msgspec.Struct, tag=True):
@@ -92,7 +93,7 @@ class Listener:
     def hear_advisory(self, advisory: m.Advisory) -> None:
         if advisory.evidence_sent_us != self._evidence_us:
             self._evidence_us = advisory.evidence_sent_us
-            self.lines.put(Decided(CLOCK.now_us(), advisory.direction))
+            self.lines.put(Decided(CLOCK.now_us(), advisory.direction, advisory.reason))
 
     def hear_health(self, health: m.Health) -> None:
         drops = {drop.cause: drop.count for drop in health.drops}

@@ -4,7 +4,7 @@ import asyncio
 
 from paani import keys
 from paani.bus import Bus
-from paani.clock import Clock, patience_us
+from paani.clock import Clock, due_after_us, patience_us
 from paani.config import CameraConfig, Config
 from paani_services.camera.picture_publisher import PicturePublisher
 
@@ -29,7 +29,7 @@ async def _relay_simulator(bus: Bus, clock: Clock, settings: CameraConfig, outpu
         while True:
             await asyncio.sleep(min(max(due_us - clock.now_us(), 0), period_us) * 1e-6)
             picture = await rendered.next()
-            due_us = clock.now_us() + period_us
+            due_us = due_after_us(due_us, period_us, clock.now_us())
             source_epoch = (picture.header.epoch, picture.header.frame_epoch)
             if origin not in {None, source_epoch}:
                 output.start_new_epoch()

@@ -11,7 +11,7 @@ from paani import keys
 from paani import messages as m
 from paani.arrays import U8
 from paani.bus import Bus, Picture
-from paani.clock import Clock, patience_us, stopwatch_ms
+from paani.clock import Clock, due_after_us, patience_us, stopwatch_ms
 from paani.config import Config
 from paani.errors import UserError
 from paani.keys import Graph
@@ -65,7 +65,7 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
                 if frame <= last:  # B3
                     bus.count_drop("duplicate_frame" if frame == last else "old_frame")
                     continue
-                last, due_us = frame, clock.now_us() + period_us
+                last, due_us = frame, due_after_us(due_us, period_us, clock.now_us())
                 evidence, mask = await loop.run_in_executor(worker, perceive, picture)
                 sent = evidence_publisher.put(evidence)
                 worker.submit(write_to_journal, sent)

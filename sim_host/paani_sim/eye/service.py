@@ -14,7 +14,7 @@ import cv2
 from paani import keys
 from paani import messages as m
 from paani.bus import Bus
-from paani.clock import Clock
+from paani.clock import Clock, due_after_us
 from paani.config import Config
 from paani_sim.eye.camera import BoatPose
 from paani_sim.eye.camera_faults import CameraFaults
@@ -72,7 +72,7 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
                     truth.actors_along_m,
                 )
                 now_us = clock.now_us()
-                due_us = min(max(due_us + period_us, now_us), now_us + period_us)
+                due_us = due_after_us(due_us, period_us, now_us)
                 if data is None:
                     continue
                 header = m.PictureHeader(
