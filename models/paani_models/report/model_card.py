@@ -70,8 +70,8 @@ _PAPER = """\
 The paper's two networks by the paper's recipes, for whoever compares: `perception.weights = "paper"`. The segmenter has
 learnt from what is left of the paper's own pictures, 88 of MaSTr1325, and the detector from random weights and the
 sources below in 16 of its 60 epochs, where the paper's began with COCO's weights and had 10,000 pictures; so both are
-worse than the paper's, and far worse than the set above. Its epoch was chosen by the pictures below. The same caution holds as for the open set: no network says whether a picture is fit, the
-speed is limited, a hull refuses the segmenter.
+worse than the paper's, and far worse than the set above. Its epoch was chosen by the pictures below. The same caution
+holds as for the open set: no network says whether a picture is fit, the speed is limited, a hull refuses the segmenter.
 """
 
 _OTHERS = {"open": _OPEN, "paper": _PAPER}
