@@ -92,14 +92,6 @@ def patience_us(rate_hz: float) -> int:
     return round(max(period_s - EARLY_S, 0.5 * period_s) * 1e6)
 
 
-def due_after_us(due_us: int, period_us: int, now_us: int) -> int:
-    """When the next is due: a period after the last one was, and now where that is past.
-
-    Counted from when the last one was due, not from when it came: what comes late does not make the next late.
-    """
-    return min(max(due_us + period_us, now_us), now_us + period_us)
-
-
 def stopwatch_ms() -> float:
     """Milliseconds of an arbitrary origin, for measuring durations."""
     return time.perf_counter_ns() * 1e-6

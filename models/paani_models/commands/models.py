@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 
 from paani.errors import UserError
-from paani_models.catalogue import OTHER_SETS, WEIGHTS, Model, load_catalogue, verified_path
+from paani_models.catalogue import OTHER_SETS, WEIGHTS, load_catalogue, verified_path
 from paani_models.commands import engines as engine_command
 from paani_models.commands import evaluate as evaluate_command
 from paani_models.commands import prepare as prepare_command
@@ -42,7 +42,8 @@ def main(argv: list[str]) -> int:
         if arguments.command == "check":
             return _check_file(arguments) if arguments.model else _check_weights(arguments.weights)
         if arguments.command == "card":
-            sys.stdout.write(render_model_card(load_catalogue(arguments.weights), _other_sets(arguments.weights)))
+            others = {name: load_catalogue(folder) for name, folder in _sets_beside(arguments.weights).items()}
+            sys.stdout.write(render_model_card(load_catalogue(arguments.weights), others))
             return 0
         if arguments.command == "prepare":
             if arguments.set != "own":
@@ -193,8 +194,7 @@ def _list_held_out(pictures: PictureSelection, without_water: bool) -> int:
 
 def _check_weights(weights: Path) -> int:
     """The set of a folder, and with the shipped one the sets beside it."""
-    others = OTHER_SETS if weights == WEIGHTS else {}
-    for kind, folder in {"": weights, **{f"{name} ": folder for name, folder in others.items()}}.items():
+    for kind, folder in {"": weights, **{f"{name} ": folder for name, folder in _sets_beside(weights).items()}}.items():
         for name, model in load_catalogue(folder).items():
             verified_path(name, folder)
             size = f"{model.size_bytes} bytes, {model.parameters} parameters"
@@ -202,9 +202,9 @@ def _check_weights(weights: Path) -> int:
     return 0
 
 
-def _other_sets(weights: Path) -> dict[str, dict[str, Model]]:
-    """Catalogues of the sets beside the shipped folder; none beside another."""
-    return {name: load_catalogue(folder) for name, folder in OTHER_SETS.items() if weights == WEIGHTS}
+def _sets_beside(weights: Path) -> dict[str, Path]:
+    """Folders of the sets beside the shipped one; none beside another."""
+    return OTHER_SETS if weights == WEIGHTS else {}
 
 
 def _check_file(arguments: argparse.Namespace) -> int:

@@ -1,11 +1,10 @@
 """Camera process: publishes the pictures of the source that `camera.source` names."""
 
-import asyncio
-
 from paani import keys
 from paani.bus import Bus
-from paani.clock import Clock, due_after_us, patience_us
+from paani.clock import Clock, patience_us
 from paani.config import CameraConfig, Config
+from paani.pace import Pace
 from paani_services.camera.picture_publisher import PicturePublisher
 
 
@@ -23,13 +22,12 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
 async def _relay_simulator(bus: Bus, clock: Clock, settings: CameraConfig, output: PicturePublisher) -> None:
     """Publish the simulator's pictures unchanged, with the time of the pose they show."""
     rendered = bus.pull_picture(keys.RENDERED)
-    period_us = patience_us(settings.rate_hz)
-    origin, due_us = None, 0
+    pace, origin = Pace(clock, patience_us(settings.rate_hz)), None
     with bus.alive():
         while True:
-            await asyncio.sleep(min(max(due_us - clock.now_us(), 0), period_us) * 1e-6)
+            await pace.wait()
             picture = await rendered.next()
-            due_us = due_after_us(due_us, period_us, clock.now_us())
+            pace.took_one()
             source_epoch = (picture.header.epoch, picture.header.frame_epoch)
             if origin not in {None, source_epoch}:
                 output.start_new_epoch()

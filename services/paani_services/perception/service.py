@@ -11,11 +11,12 @@ from paani import keys
 from paani import messages as m
 from paani.arrays import U8
 from paani.bus import Bus, Picture
-from paani.clock import Clock, due_after_us, patience_us, stopwatch_ms
+from paani.clock import Clock, patience_us, stopwatch_ms
 from paani.config import Config
 from paani.errors import UserError
 from paani.keys import Graph
 from paani.memory import release_freed_memory
+from paani.pace import Pace
 from paani.runtime import runtime_dir
 from paani_services.perception.journal import JOURNAL_FOLDER, Journal
 from paani_services.perception.pipeline import Perceiver
@@ -41,8 +42,7 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     judge_weights(config)
     folder = await asyncio.to_thread(runtime_dir, config.bus)
     journal = Journal(folder / JOURNAL_FOLDER, round(config.perception.journal_max_mib * 2**20))
-    period_us = patience_us(config.perception.rate_hz)
-    last, due_us = (-1, -1), 0
+    pace, last = Pace(clock, patience_us(config.perception.rate_hz)), (-1, -1)
 
     def perceive(picture: Picture) -> tuple[m.Evidence, Picture | None]:
         age_s = (clock.now_us() - picture.header.source_us) * 1e-6
@@ -57,7 +57,7 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     try:
         with bus.alive():
             while True:
-                await asyncio.sleep(min(max(due_us - clock.now_us(), 0), period_us) * 1e-6)
+                await pace.wait()
                 picture = await pictures.next()
                 frame = (picture.header.frame_epoch, picture.header.frame_seq)
                 if last[0] * 1000 > clock.now_us() + config.bus.max_future_s * 1e6:  # before the clock was set back
@@ -65,7 +65,8 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
                 if frame <= last:  # B3
                     bus.count_drop("duplicate_frame" if frame == last else "old_frame")
                     continue
-                last, due_us = frame, due_after_us(due_us, period_us, clock.now_us())
+                last = frame
+                pace.took_one()
                 evidence, mask = await loop.run_in_executor(worker, perceive, picture)
                 sent = evidence_publisher.put(evidence)
                 worker.submit(write_to_journal, sent)

@@ -14,8 +14,9 @@ import cv2
 from paani import keys
 from paani import messages as m
 from paani.bus import Bus
-from paani.clock import Clock, due_after_us
+from paani.clock import Clock
 from paani.config import Config
+from paani.pace import Pace
 from paani_sim.eye.camera import BoatPose
 from paani_sim.eye.camera_faults import CameraFaults
 from paani_sim.eye.configured_camera import boat_pose, open_eye
@@ -47,15 +48,15 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     poses = bus.latest(keys.TRUE_POSE)
     pictures = bus.picture_publisher(keys.RENDERED)
     loop, gl_thread = asyncio.get_running_loop(), ThreadPoolExecutor(1, "gl", os.nice, (NICE,))
-    settings, period_us = config.eye, round(1e6 / config.eye.rate_hz)
+    settings = config.eye
     eye, faults = await loop.run_in_executor(gl_thread, open_camera, config)
     try:
         start = BoatPose(*eye.world.start)
         await loop.run_in_executor(gl_thread, render_jpeg, eye, CameraFaults(()), start, 0.0, settings.jpeg_quality)
         with bus.alive():
-            due_us, frame_seq, epoch = clock.now_us(), 0, None
+            pace, frame_seq, epoch = Pace(clock, round(1e6 / settings.rate_hz)), 0, None
             while True:
-                await asyncio.sleep(min(max(due_us - clock.now_us(), 0), period_us) * 1e-6)
+                await pace.wait()
                 truth = await poses.next()
                 if epoch not in {None, truth.epoch}:
                     pictures.new_epoch()
@@ -71,8 +72,7 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
                     settings.jpeg_quality,
                     truth.actors_along_m,
                 )
-                now_us = clock.now_us()
-                due_us = due_after_us(due_us, period_us, now_us)
+                pace.took_one()
                 if data is None:
                     continue
                 header = m.PictureHeader(

@@ -19,6 +19,7 @@ from paani_tools.paper_report.command import markdown, report_text
 from paani_tools.paper_report.recipes import DETECTOR, SEGMENTER, training_table
 from paani_tools.paper_report.settings import BOAT, RUNTIME
 from paani_tools.paper_report.tables import (
+    BANDED,
     SHIPPED,
     TRAINED,
     board_tables,
@@ -126,7 +127,10 @@ def test_int8_of_the_papers_segmenter_stands_beside_the_papers_figures() -> None
     trained = Experiment("paper-segmenter", "0", "eighty pictures", (Figure("miou", "mastr1325", 0.9, 24),))
     quantised = msgspec.structs.replace(trained, figures=(Figure("miou", "mastr1325", 0.8, 24),), inference="INT8")
     table = quantised_table((msgspec.structs.replace(quantised, net="segmenter"), trained, quantised))
-    assert table.rows == (("V10", "mean IoU, INT8", published.INT8["miou"], 0.8, 24, "eighty pictures"),)
+    assert table.rows == (
+        ("V10", "mean IoU, INT8", published.INT8["miou"], 0.8, 24, "eighty pictures"),
+        ("V10", "F1 of edges, INT8", published.INT8["edge_f1"], None, 0, BANDED),
+    )
     assert markdown(quantised_table(read_experiments(WEIGHTS))) in report_text(None)
 
 
