@@ -18,6 +18,7 @@ from paani_services.navigator.avoidance.clearance import APPROACH_S, UNSEEN_GROW
 from paani_services.navigator.avoidance.evaluation import CandidateEvaluation
 from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle
 
+LEAST_CLOSING_MPS = 1e-6  # keeps directions finite
 UNDER_WAY_MPS = (0.1, 0.2)  # slower for certain: adrift; faster for certain: under way
 SOON_S = 15.0  # manoeuvres are due from then on: 13 s before a barge at 3 m/s, 8.5 s before a kayak at 1.5 m/s
 PAST_S = 1.0  # in which an encounter ends: the time that half a hull takes
@@ -88,11 +89,13 @@ def _pass(vessel: DynamicObstacle, boat: Sequence[F64], fastest: I64, course_rad
     x_m, y_m, boat_east_mps, boat_north_mps = boat
     velocity = vessel.velocity
     east_mps, north_mps = boat_east_mps - velocity.east_mps, boat_north_mps - velocity.north_mps
-    closing_mps = np.maximum(np.sqrt(east_mps * east_mps + north_mps * north_mps), 1e-6)
+    closing_mps = np.maximum(np.sqrt(east_mps * east_mps + north_mps * north_mps), LEAST_CLOSING_MPS)
     east_m, north_m = vessel.east_m[:, None] - x_m, vessel.north_m[:, None] - y_m
     to_port_m = (east_mps * north_m - north_mps * east_m) / closing_mps
     time_s = ((east_mps * east_m + north_mps * north_m) / (closing_mps * closing_mps)).max(axis=0)[fastest]
-    across_variance = velocity.variance_along(-north_mps / closing_mps, east_mps / closing_mps)
+    across_variance = np.asarray(velocity.variance_along(-north_mps / closing_mps, east_mps / closing_mps))
+    # Without motion between the two there is no direction across it: that of the same heading, faster, stands for it.
+    across_variance = np.where(closing_mps > LEAST_CLOSING_MPS, across_variance, across_variance[fastest])
     unknown_s = vessel.age_s + np.minimum(np.maximum(time_s, 0.0), APPROACH_S)
     deviation_m = np.sqrt(across_variance) * unknown_s + UNSEEN_GROWTH_MPS * vessel.age_s
     speed_mps = math.hypot(velocity.east_mps, velocity.north_mps)
