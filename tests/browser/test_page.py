@@ -20,6 +20,9 @@ pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
 
 WAIT_S = 20.0
 TOLERANCE = 14
+# Chromium ends requests under way when a device of the machine comes or goes, as containers' do beside these tests;
+# the page is then loaded again.
+NETWORK_CHANGED = "net::ERR_NETWORK_CHANGED"
 OWN_HULL = "[[0.4, 1.0], [0.4, 0.95], [0.6, 0.95], [0.6, 1.0]]"
 WATER_RGBA, OBSTACLE_RGBA = (23, 184, 214, 66), (242, 140, 30, 100)
 ACCEPTED_RGB = (255, 180, 84)
@@ -54,11 +57,15 @@ class Watched:
     def __init__(self, page: Any, origin: str) -> None:
         self.page, self.errors = page, []
         self.foreign_requests: list[str] = []
-        page.on("console", lambda line: self.errors.append(line.text) if line.type == "error" else None)
+        page.on("console", lambda line: self._note_line(line.type, line.text))
         page.on("pageerror", lambda error: self.errors.append(str(error)))
         page.on("request", lambda request: self._note_request(request.url, origin))
 
     errors: list[str]
+
+    def _note_line(self, kind: str, text: str) -> None:
+        if kind == "error" and NETWORK_CHANGED not in text:
+            self.errors.append(text)
 
     def _note_request(self, url: str, origin: str) -> None:
         if not url.startswith((origin, "blob:", "data:")):
@@ -286,9 +293,27 @@ async def wait_for_arming(boat: Boat, *, armed: bool, stopped: bool) -> None:
 
 async def until(page: Any, expression: str) -> None:
     """Wait until an expression is true; the page's policy forbids Playwright's own waiting, which evaluates text."""
+    from playwright.async_api import Error  # noqa: PLC0415  without a browser these tests skip
+
     async with asyncio.timeout(WAIT_S):
-        while not await page.evaluate(expression):
+        while True:
+            try:
+                if await page.evaluate(expression):
+                    return
+            except Error:
+                if await is_loaded(page):
+                    raise
             await asyncio.sleep(0.05)
+
+
+async def is_loaded(page: Any) -> bool:
+    """Whether all scripts of the dashboard's page have run, and it is not loaded again at this moment."""
+    from playwright.async_api import Error  # noqa: PLC0415  without a browser these tests skip
+
+    try:
+        return bool(await page.evaluate("typeof paani !== 'undefined'"))
+    except Error:
+        return False
 
 
 async def has_colour_on_map(page: Any, rgb: tuple[int, int, int], east_m: float, north_m: float) -> bool:
