@@ -27,7 +27,7 @@ LAP = OPEN_WATER + (
     "[route]\nclosed = true\n"
     "waypoints_m = [[0.0, 0.0], [4.2, -2.8], [9.8, -3.5], [14.7, -2.1], [16.8, 2.1], [14.7, 6.3], [9.8, 7.7],"
     " [4.2, 7.0], [0.0, 4.2]]\n"
-    "[task]\ntime_limit_s = 150.0\n"
+    "[task]\ntime_limit_s = 200.0\n"
     '[[actors]]\nlook = "can"\nat_m = [9.8, -3.2]\n'
     '[[actors]]\nlook = "rowboat"\nat_m = [9.8, 8.3]\nheading_deg = 10.0\n'
 )
