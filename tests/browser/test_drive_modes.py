@@ -16,7 +16,7 @@ from paani.messages import DriveMode
 from tests.arming import arm_on_page
 from tests.browser.conftest import Boat
 from tests.browser.guidance import ORDER, guiding
-from tests.browser.test_drive import WAIT_S, Orders, button_text, drive_manually
+from tests.browser.test_drive import HIDE, WAIT_S, Orders, button_text, drive_manually
 from tests.browser.test_map_objects import AHEAD
 from tests.browser.test_page import until, watch
 from tests.conftest import OpenAs, Spawn
@@ -26,6 +26,7 @@ pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
 NOTE, OVERRIDE, WORD, LOG = (
     f"document.querySelector('#{name}').textContent" for name in ("drive-note", "drive-override", "order-detail", "log")
 )
+ENDED = "the advice is no longer overridden: "
 ORDERED = (DriveMode.HOLD, DriveMode.RETURN, DriveMode.IDLE, DriveMode.ROUTE)
 
 
@@ -68,5 +69,15 @@ async def test_each_mode_is_ordered_on_the_page_and_the_advice_overridden_on_pur
         await orders.until(lambda found: not found.is_overridden)
         await until(page, f"{OVERRIDE} === 'Override the advice for 10 s'")
         assert orders.mode is DriveMode.MANUAL
+        await until(page, f"{LOG}.includes('{ENDED}its time is over')")
+        await page.click("#drive-override")
+        await orders.until(lambda found: found.is_overridden)
+        await page.click("[data-drive=IDLE]")
+        await until(page, f"{LOG}.includes('{ENDED}its hand ordered a mode')")
+        await drive_manually(page, orders)
+        await page.click("#drive-override")
+        await orders.until(lambda found: found.is_overridden)
+        await page.evaluate(HIDE, True)
+        await until(page, f"{LOG}.includes('{ENDED}its hand was not heard any more')")
         saying.cancel()
         assert watched.errors == []

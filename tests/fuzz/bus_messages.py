@@ -166,8 +166,7 @@ class DisarmedChain(Target):
                 client = topic.name.rpartition("/")[2]
                 self._loop.run_until_complete(self._console.answer_mission(client, message))
             case m.OperatorState():
-                event = describe_operator_change(self._operator_state, message, now_us)
-                if event is not None:
+                for event in describe_operator_change(self._operator_state, message, now_us):
                     self._hub.publish_event(event)
                 self._operator_state = message
             case m.ThrustApplied():

@@ -26,8 +26,24 @@ MODE_REFUSALS = {
 }
 
 
-def describe_operator_change(before: m.OperatorState | None, now: m.OperatorState, now_us: int) -> Event | None:
-    """A line for the page's log when the operator has stopped, armed, disarmed or ordered something else."""
+OVERRIDE_ENDS = {
+    m.OverrideEnd.NONE: "the operator's process does not say why",
+    m.OverrideEnd.EXPIRED: "its time is over",
+    m.OverrideEnd.ORDERED: "its hand ordered a mode",
+    m.OverrideEnd.TAKEN: "another hand took the wheel",
+    m.OverrideEnd.SILENT: "its hand was not heard any more",
+    m.OverrideEnd.DISARMED: "the boat is no longer armed",
+}
+
+
+def describe_operator_change(before: m.OperatorState | None, now: m.OperatorState, now_us: int) -> tuple[Event, ...]:
+    """Lines for the page's log: what the operator did, and that an override of the advice has ended."""
+    lines = (_describe_act(before, now, now_us), _describe_override_end(before, now, now_us))
+    return tuple(line for line in lines if line is not None)
+
+
+def _describe_act(before: m.OperatorState | None, now: m.OperatorState, now_us: int) -> Event | None:
+    """A line when the operator has stopped, armed, disarmed or ordered something else."""
     if before is None or before.epoch != now.epoch:
         return Event(now_us, "info", "the operator's process is here: not armed") if not now.armed else None
     if now.stops != before.stops:
@@ -38,6 +54,14 @@ def describe_operator_change(before: m.OperatorState | None, now: m.OperatorStat
     if before.armed and not now.armed:
         return Event(now_us, "warn", "disarmed: the page's process has gone or begun again")
     return _describe_wheel_change(before, now, now_us)
+
+
+def _describe_override_end(before: m.OperatorState | None, now: m.OperatorState, now_us: int) -> Event | None:
+    if before is None or before.override_ms == 0.0 or now.override_ms > 0.0:
+        return None
+    is_same = before.epoch == now.epoch
+    why = OVERRIDE_ENDS[now.override_end] if is_same else "the operator's process has begun again"
+    return Event(now_us, "warn", f"the advice is no longer overridden: {why}")
 
 
 def _describe_wheel_change(before: m.OperatorState, now: m.OperatorState, now_us: int) -> Event | None:

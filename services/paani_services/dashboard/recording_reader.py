@@ -72,8 +72,7 @@ def read_series(log: Log) -> Series:
         except UNDECODABLE:  # of another version, or damaged
             continue
         newest.put(record.topic, message, record.log_us)
-        if (event := _event(before.get(record.topic), message, record.log_us)) is not None:
-            events.append(event)
+        events += _events(before.get(record.topic), message, record.log_us)
         before[record.topic] = message
     newest.now_us = due_us = log.end_us
     samples.append(sample_of(newest, services, due_us))
@@ -120,16 +119,16 @@ def _frame(item: Record | RecordedPicture, topic: keys.Topic[Any]) -> bytes:
     return encode_frame(item.topic, FrameHeader(age_ms=0, at_us=item.log_us), item.data)
 
 
-def _event(before: m.Message | None, now: m.Message, at_us: int) -> Event | None:
-    """A line of the log, as the page of that drive had it."""
+def _events(before: m.Message | None, now: m.Message, at_us: int) -> tuple[Event, ...]:
+    """Lines of the log, as the page of that drive had them."""
     if isinstance(now, m.OperatorState):
         return describe_operator_change(before if isinstance(before, m.OperatorState) else None, now, at_us)
     if not isinstance(now, m.Advisory):
-        return None
+        return ()
     if isinstance(before, m.Advisory) and (before.direction, before.reason) == (now.direction, now.reason):
-        return None
+        return ()
     level = "stop" if now.direction in {m.Direction.STOP, m.Direction.NO_DATA} else "info"
-    return Event(at_us, level, f"{now.direction.value}: {now.reason.value.lower()}".replace("_", " "))
+    return (Event(at_us, level, f"{now.direction.value}: {now.reason.value.lower()}".replace("_", " ")),)
 
 
 def main(arguments: list[str]) -> int:

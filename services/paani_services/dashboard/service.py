@@ -115,7 +115,7 @@ async def forward_operator(hub: Hub, inbox: Latest[m.OperatorState], clock: Cloc
     before: m.OperatorState | None = None
     while True:
         value = await inbox.next()
-        if (event := describe_operator_change(before, value, clock.now_us())) is not None:
+        for event in describe_operator_change(before, value, clock.now_us()):
             hub.publish_event(event)
         before = value
         hub.put(keys.OPERATOR_STATE.name, value, inbox.received_us, clock.now_us())

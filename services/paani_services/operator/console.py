@@ -121,7 +121,7 @@ class Console:
     def publish(self) -> None:
         """Publish the present state now."""
         now_us = self._clock.now_us()
-        self.wheel = w.lapse(self.wheel, now_us, armed=self.state.armed)
+        self._take_wheel(self.wheel, now_us)
         self._orders.put(self._order(now_us))
         self._arming.put(op.arming_message(self.state, now_us))
         state = op.state_message(self.state, now_us, latch_kept=self._latch_kept)
@@ -189,13 +189,19 @@ class Console:
     def _turn(self, wheel: w.Wheel) -> None:
         """Take a new wheel, and publish it at once where it says something new; another set-point is the order's."""
         before, now_us = self.wheel, self._clock.now_us()
-        self.wheel = w.lapse(wheel, now_us, armed=self.state.armed)
-        if self.wheel.override_until_us > now_us and not before.override_until_us:
-            LOG.warning("%s overrides the advice for %g s", self.wheel.by, w.OVERRIDE_S)
+        self._take_wheel(wheel, now_us)
         if msgspec.structs.replace(self.wheel, stick=before.stick) != before:
             self.publish()
         elif self.wheel != before:
             self._orders.put(self._order(now_us))
+
+    def _take_wheel(self, wheel: w.Wheel, now_us: int) -> None:
+        """Take a new wheel as time has it; an override that begins or ends with it is logged."""
+        before, self.wheel = self.wheel, w.lapse(wheel, now_us, armed=self.state.armed)
+        if self.wheel.override_until_us and not before.override_until_us:
+            LOG.warning("%s overrides the advice for %g s", self.wheel.by, w.OVERRIDE_S)
+        if before.override_until_us and not self.wheel.override_until_us:
+            LOG.warning("the advice is no longer overridden: %s", self.wheel.override_end)
 
     def _order(self, now_us: int) -> m.OperatorOrder:
         order = w.order_message(self.wheel, now_us, armed=self.state.armed)

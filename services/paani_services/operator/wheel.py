@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from paani import messages as m
 from paani.keys import STOPPING_CLIENTS
-from paani.messages import DriveMode, ModeRefusal, RequestAct
+from paani.messages import DriveMode, ModeRefusal, OverrideEnd, RequestAct
 from paani_services.operator.missions import NO_MISSION
 from paani_services.operator.return_place import choose_place
 
@@ -59,7 +59,10 @@ class Answer(msgspec.Struct, frozen=True):
 
 
 class Wheel(msgspec.Struct, frozen=True, kw_only=True):
-    """`since_us`: when the mode was ordered. `by`, `hand`: who holds the wheel. `override_until_us`: 0 without one."""
+    """`since_us`: when the mode was ordered. `by`, `hand`: who holds the wheel. `override_until_us`: 0 without one.
+
+    `override_end`: why there is none any more.
+    """
 
     mode: DriveMode = DriveMode.ROUTE
     since_us: int = 0
@@ -68,6 +71,7 @@ class Wheel(msgspec.Struct, frozen=True, kw_only=True):
     hand: int = 0
     stick: Stick = Stick()
     override_until_us: int = 0
+    override_end: OverrideEnd = OverrideEnd.NONE
     answer: Answer = Answer()
 
 
@@ -99,7 +103,8 @@ def answer(wheel: Wheel, client: str, request: m.OperatorRequest, facts: Facts, 
             case RequestAct.WHEEL:
                 wheel = _take(wheel, client, request.hand, now_us)
             case RequestAct.OVERRIDE:
-                wheel = replace(wheel, override_until_us=now_us + round(OVERRIDE_S * 1e6))
+                until_us = now_us + round(OVERRIDE_S * 1e6)
+                wheel = replace(wheel, override_until_us=until_us, override_end=OverrideEnd.NONE)
     return replace(wheel, answer=Answer(client, request.press, refusal))
 
 
@@ -116,10 +121,12 @@ def lapse(wheel: Wheel, now_us: int, *, armed: bool) -> Wheel:
 
     A clock that is set back is silence too.
     """
-    if wheel.mode is DriveMode.MANUAL and (not armed or _is_silent(wheel.stick, now_us)):
-        return _rest(wheel, now_us)
     if wheel.override_until_us and not is_overridden(wheel, now_us):
-        return replace(wheel, override_until_us=0)
+        wheel = replace(wheel, override_until_us=0, override_end=OverrideEnd.EXPIRED)
+    if wheel.mode is DriveMode.MANUAL and not armed:
+        return _rest(wheel, now_us, OverrideEnd.DISARMED)
+    if wheel.mode is DriveMode.MANUAL and _is_silent(wheel.stick, now_us):
+        return _rest(wheel, now_us, OverrideEnd.SILENT)
     return wheel
 
 
@@ -154,6 +161,7 @@ def with_wheel(state: m.OperatorState, wheel: Wheel, facts: Facts, now_us: int) 
         wheel_by=wheel.by,
         wheel_hand=wheel.hand,
         override_ms=(wheel.override_until_us - now_us) * 1e-3 if is_overridden(wheel, now_us) else 0.0,
+        override_end=wheel.override_end,
         answered_by=wheel.answer.client,
         answered=wheel.answer.press,
         mode_refusal=wheel.answer.refusal,
@@ -181,7 +189,9 @@ def _holds(wheel: Wheel, client: str, hand: int) -> bool:
 def _begin_mode(wheel: Wheel, client: str, request: m.OperatorRequest, facts: Facts, now_us: int) -> Wheel:
     """The mode begins, with the stick in neutral."""
     wheel = _take(wheel, client, request.hand, now_us)
-    return replace(_rest(wheel, now_us), mode=request.mode, target=_find_target(request.mode, facts))
+    return replace(
+        _rest(wheel, now_us, OverrideEnd.ORDERED), mode=request.mode, target=_find_target(request.mode, facts)
+    )
 
 
 def _find_target(mode: DriveMode, facts: Facts) -> tuple[m.Waypoint, ...]:
@@ -201,14 +211,19 @@ def _take(wheel: Wheel, client: str, hand: int, now_us: int) -> Wheel:
     if _holds(wheel, client, hand):
         return wheel
     if wheel.mode is DriveMode.MANUAL:
-        wheel = _rest(wheel, now_us)
+        wheel = _rest(wheel, now_us, OverrideEnd.TAKEN)
     return replace(wheel, by=client, hand=hand, stick=Stick())
 
 
-def _rest(wheel: Wheel, now_us: int) -> Wheel:
-    """No thrust, and the stick let go. Its number stays, so that a set-point still under way is not taken."""
+def _rest(wheel: Wheel, now_us: int, end: OverrideEnd) -> Wheel:
+    """No thrust, and the stick let go. Its number stays, so that a set-point still under way is not taken.
+
+    end: why an override ends, where one is in force.
+    """
+    if wheel.override_until_us:
+        wheel = replace(wheel, override_until_us=0, override_end=end)
     stick = Stick(received_us=now_us, number=wheel.stick.number)
-    return replace(wheel, mode=DriveMode.IDLE, since_us=now_us, target=(), stick=stick, override_until_us=0)
+    return replace(wheel, mode=DriveMode.IDLE, since_us=now_us, target=(), stick=stick)
 
 
 def _is_silent(stick: Stick, now_us: int) -> bool:

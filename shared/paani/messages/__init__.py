@@ -41,6 +41,7 @@ from paani.messages.operator import (
     OperatorOrder,
     OperatorRequest,
     OperatorState,
+    OverrideEnd,
     RequestAct,
 )
 from paani.messages.perception import (
@@ -130,6 +131,7 @@ __all__ = [
     "OperatorRequest",
     "OperatorState",
     "OutputMessage",
+    "OverrideEnd",
     "PictureHeader",
     "Prediction",
     "Pulse",

@@ -94,6 +94,21 @@ class ModeRefusal(StrEnum):
     NOT_MANUAL = "NOT_MANUAL"
 
 
+class OverrideEnd(StrEnum):
+    """Why the last override of the advice ended; NONE while one is in force, or before any.
+
+    EXPIRED: its time was over. ORDERED: its hand ordered a mode. TAKEN: another hand took the wheel. SILENT: its hand
+    was not heard for too long. DISARMED: the boat was stopped or disarmed.
+    """
+
+    NONE = "NONE"
+    EXPIRED = "EXPIRED"
+    ORDERED = "ORDERED"
+    TAKEN = "TAKEN"
+    SILENT = "SILENT"
+    DISARMED = "DISARMED"
+
+
 class BarredMode(msgspec.Struct, frozen=True, kw_only=True):
     """A mode that may not start now, whoever asks, and why."""
 
@@ -130,10 +145,11 @@ class OperatorState(Message, frozen=True, kw_only=True):
     `press_by`, `press`, `refusal`: the press that ended last.
 
     `mode`, `mode_since_us`: the mode in force, as in `OperatorOrder`. `wheel_by`, `wheel_hand`: who holds the wheel,
-    empty while nobody does. `override_ms`: for how long the advice does not veto yet. `answered_by`, `answered`,
-    `mode_refusal`: the request for a mode, the wheel or an override that was answered last. `barred`: modes that may
-    not start now. `mission_us`: as in `OperatorOrder`. `mission_answered_by`, `mission_answered`, `mission_refusal`,
-    `mission_fault`: the request for a mission that was answered last; of INVALID what is wrong, and where.
+    empty while nobody does. `override_ms`: for how long the advice does not veto yet; `override_end`: why it
+    vetoes again. `answered_by`, `answered`, `mode_refusal`: the request for a mode, the wheel or an override that was
+    answered last. `barred`: modes that may not start now. `mission_us`: as in `OperatorOrder`. `mission_answered_by`,
+    `mission_answered`, `mission_refusal`, `mission_fault`: the request for a mission that was answered last; of INVALID
+    what is wrong, and where.
     """
 
     armed: bool
@@ -162,3 +178,4 @@ class OperatorState(Message, frozen=True, kw_only=True):
     mission_answered: Count = 0
     mission_refusal: MissionRefusal = MissionRefusal.NONE
     mission_fault: Text = ""
+    override_end: OverrideEnd = OverrideEnd.NONE

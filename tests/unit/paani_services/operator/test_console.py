@@ -178,6 +178,20 @@ async def test_a_stop_ends_manual_and_arming_again_does_not_bring_it_back(tmp_pa
     assert (desk.orders.messages[-1].mode, desk.orders.messages[-1].surge) == (m.DriveMode.IDLE, 0.0)
 
 
+async def test_an_override_is_logged_when_it_begins_and_when_it_ends(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    desk = Desk(tmp_path)
+    await desk.arm(1)
+    await desk.order(m.RequestAct.MODE, 91, m.DriveMode.MANUAL)
+    await desk.order(m.RequestAct.OVERRIDE, 92)
+    await desk.order(m.RequestAct.DRIVE, 93)
+    await desk.ask(m.RequestAct.STOP)
+    said = [record.getMessage() for record in caplog.records if "overrid" in record.getMessage()]
+    assert said == ["dashboard overrides the advice for 10 s", "the advice is no longer overridden: DISARMED"]
+    assert desk.states.messages[-1].override_end is m.OverrideEnd.DISARMED
+
+
 async def test_no_request_for_a_mode_arms(tmp_path: Path) -> None:
     desk = Desk(tmp_path)
     for press, mode in enumerate(m.DriveMode):

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from paani import messages as m
 from paani.keys import SHORE, STATION
-from paani.messages import DriveMode, ModeRefusal, RequestAct
+from paani.messages import DriveMode, ModeRefusal, OverrideEnd, RequestAct
 from paani_services.operator import wheel as w
 
 BEGUN_US = 1_000_000_000
@@ -208,6 +208,44 @@ def test_an_override_is_of_manual_alone_and_ends_by_itself() -> None:
     bridge.ask(RequestAct.OVERRIDE)
     bridge.mode(DriveMode.MANUAL)
     assert not bridge.order.override, "it belongs to the MANUAL it was asked for in"
+
+
+def test_the_cause_of_an_overrides_end_is_kept_until_the_next_one_begins() -> None:
+    def lose_hand(bridge: Bridge) -> None:
+        bridge.wait(w.DEFLECTED_MAX_S + 1e-6)
+
+    def disarm(bridge: Bridge) -> None:
+        bridge.armed = False
+        bridge.wait(0.0)
+
+    def let_time_pass(bridge: Bridge) -> None:
+        for _ in range(100):
+            bridge.wait(0.1)
+            bridge.drive(0.5)
+
+    for ends, cause in (
+        (let_time_pass, OverrideEnd.EXPIRED),
+        (lambda bridge: bridge.mode(DriveMode.HOLD), OverrideEnd.ORDERED),
+        (lambda bridge: bridge.mode(DriveMode.IDLE), OverrideEnd.ORDERED),
+        (lambda bridge: bridge.ask(RequestAct.WHEEL, hand=2), OverrideEnd.TAKEN),
+        (lose_hand, OverrideEnd.SILENT),
+        (disarm, OverrideEnd.DISARMED),
+    ):
+        bridge = at_the_wheel()
+        bridge.mode(DriveMode.MANUAL)
+        assert bridge.wheel.override_end is OverrideEnd.NONE, "none was in force"
+        bridge.ask(RequestAct.OVERRIDE)
+        bridge.drive(0.5)
+        ends(bridge)
+        assert (bridge.wheel.override_until_us, bridge.wheel.override_end) == (0, cause)
+        state = w.with_wheel(m.OperatorState(source_us=5, armed=True, stopped=False), bridge.wheel, ALL, bridge.now_us)
+        assert (state.override_ms, state.override_end) == (0.0, cause)
+        bridge.armed = True
+        bridge.ask(RequestAct.WHEEL)
+        bridge.mode(DriveMode.MANUAL)
+        assert bridge.wheel.override_end is cause
+        bridge.ask(RequestAct.OVERRIDE)
+        assert bridge.wheel.override_end is OverrideEnd.NONE
 
 
 REQUESTS = st.builds(
