@@ -68,15 +68,21 @@ AHEAD = m.Prediction(
     headings=tuple(verdict(off) for off in (0, *(side * step for step in range(20, 180, 20) for side in (1, -1)))),
 )  # fmt: skip
 
-NAMES = """async (places) => {
-  const { drawObstacles } = await import("/static/map_objects.js");
+NAMES = """async ([places, next, ghost]) => {
+  const { drawGhost, drawObstacles } = await import("/static/map_objects.js");
+  const { drawRoute } = await import("/static/map_boat.js");
+  const { MapLabels } = await import("/static/map_labels.js");
+  const labels = new MapLabels(), colour = (name) => ({ "--red": "#f00", "--quiet": "#999" })[name] ?? "#000";
   const ctx = document.createElement("canvas").getContext("2d"), words = [];
-  ctx.fillText = (text, x, y) => words.push([text, x, y, ctx.measureText(text).width]);
-  const chart = { ctx, toScreen: (x, y) => [10 * x, 10 * y], pxPerM: 10, turnRad: 0, colour: () => "#000" };
+  ctx.fillText = (text, x, y) => words.push([text, x, y, ctx.measureText(text).width, ctx.fillStyle]);
+  const chart = { ctx, toScreen: (x, y) => [10 * x, 10 * y], pxPerM: 10, turnRad: 0, colour, labels };
   const still = { radius_m: 1, east_mps: 0, north_mps: 0, cpa_m: 2, tcpa_s: 9 };
   const obstacles = places.map(([x_m, y_m], index) => ({ ...still, x_m, y_m, track_id: index + 1 }));
   const tracks = obstacles.map(({ track_id: id }) => ({ id, label: "buoy" }));
   drawObstacles(chart, obstacles, { x_m: 0, y_m: 0, yaw_rad: 0, surge_mps: 0 }, 0, tracks);
+  if (next) drawRoute(chart, { waypoints: [{ x_m: next[0], y_m: next[1] }] }, 0, 1);
+  if (ghost) drawGhost(chart, { x_m: ghost[0], y_m: ghost[1], yaw_rad: 0, surge_mps: 0 }, 12);
+  labels.draw(ctx, colour);
   return words;
 }"""
 
@@ -199,11 +205,31 @@ async def test_the_map_shows_what_the_boat_is_told_and_what_comes(
 
 
 async def test_the_names_of_obstacles_beside_each_other_lie_on_none_of_the_others(scripts_page: Any) -> None:
-    words = await scripts_page.evaluate(NAMES, [[20.0, 10.0], [20.4, 10.2], [20.1, 10.1], [60.0, 10.0]])
-    boxes = [(x, x + width, y - 12, y) for _, x, y, width in words]
+    places = [[20.0, 10.0], [20.4, 10.2], [20.1, 10.1], [60.0, 10.0]]
+    words = await scripts_page.evaluate(NAMES, [places, None, None])
     assert sorted(text for text, *_ in words if "#" in text) == ["buoy #1", "buoy #2", "buoy #3", "buoy #4"]
     assert len(words) == 8, "each with how near it comes"
-    for index, (left, right, top, bottom) in enumerate(boxes):
-        for other in boxes[:index]:
-            assert right <= other[0] or other[1] <= left or bottom <= other[2] or other[3] <= top, words
-    assert ("buoy #4", 104.0) in [(text, y) for text, _, y, _ in words], "what stands alone keeps its place"
+    assert overlaps(words) == []
+    assert ("buoy #4", 104.0) in [(text, y) for text, _, y, *_ in words], "what stands alone keeps its place"
+
+
+@pytest.mark.parametrize("below_m", [0.0, 0.6, 1.2, 1.7, 2.4])
+async def test_the_boat_that_is_not_heard_of_leaves_the_next_waypoint_legible(
+    scripts_page: Any, below_m: float
+) -> None:
+    """And the name of what swims there."""
+    words = await scripts_page.evaluate(NAMES, [[[20.2, 10.3]], [20.0, 10.0], [20.0, 10.0 + below_m]])
+    colours = {text: colour for text, *_, colour in words}
+    assert set(colours) == {"next 1", "not heard for 12 s", "buoy #1", "nearest 2.0 m in 9 s"}
+    assert (colours["next 1"], colours["not heard for 12 s"]) == ("#999999", "#ff0000")
+    assert overlaps(words) == []
+
+
+def overlaps(words: list[tuple[str, float, float, float, str]]) -> list[tuple[str, str]]:
+    """Words that lie on each other, of lines 12 px high."""
+    return [
+        (text, other)
+        for index, (text, x, y, width, _) in enumerate(words)
+        for other, other_x, other_y, other_width, _ in words[:index]
+        if x < other_x + other_width and other_x < x + width and abs(y - other_y) < 12
+    ]

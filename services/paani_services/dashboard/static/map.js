@@ -5,6 +5,7 @@ import { drawBoat, drawRoute, drawTrack } from "./map_boat.js";
 import { MapControls } from "./map_controls.js";
 import { drawGrid, drawScale } from "./map_ground.js";
 import { MapHeadings } from "./map_headings.js";
+import { MapLabels } from "./map_labels.js";
 import { drawFence, drawGhost, drawHome, drawObstacles, drawPath, drawRally, drawStations } from "./map_objects.js";
 import { MapTiles } from "./map_tiles.js";
 import { MapProjection, NORTH_RAD, placeAhead } from "./map_projection.js";
@@ -85,7 +86,7 @@ export class MapPanel {
     ctx.clearRect(0, 0, width, height);
     const css = getComputedStyle(document.documentElement), colour = (/** @type {string} */ name) => css.getPropertyValue(name).trim();
     const toScreen = (/** @type {number} */ x, /** @type {number} */ y) => projection.toScreen(x, y);
-    const chart = { ctx, toScreen, turnRad, pxPerM, colour };
+    const labels = new MapLabels(), chart = { ctx, toScreen, turnRad, pxPerM, colour, labels };
     this.tiles.render(ctx, projection, odometry, colour("--panel"), Number(colour("--tiles")));
     drawGrid(ctx, projection, colour("--line"));
     this.drawGiven(chart, store, mission, route);
@@ -98,6 +99,7 @@ export class MapPanel {
     const poseAgeS = store.ageS("localization/odometry", now);
     const isOver = isReplay(store) && store.silenceS(now) > store.limitS("localization/odometry"); // nobody is lost where a recording ends
     if (odometry && poseAgeS > store.limitS("localization/odometry") && !isOver) drawGhost(chart, odometry, poseAgeS);
+    labels.draw(ctx, colour);
     this.headings.render(chart, prediction?.headings ?? [], odometry, store.get("dashboard/settings")?.planner ?? true, this.editor.isOpen);
     this.editor.draw(chart);
     drawScale(ctx, projection, colour("--quiet"), colour("--panel"));

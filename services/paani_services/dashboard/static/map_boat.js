@@ -1,15 +1,12 @@
 // @ts-check
 // Draws on the map where the boat is, where it was, and the route it follows.
 
-import { drawWords } from "./map_ground.js";
 import { MAP_TEXTS } from "./text.js";
-
-const FONT = "12px system-ui, sans-serif";
 
 /** @typedef {import("./map_objects.js").Chart} Chart */
 
 /** @param {Chart} chart @param {any} route @param {number} next index of the waypoint ahead; -1: unknown @param {number} acceptanceM */
-export function drawRoute({ ctx, toScreen, pxPerM, colour }, route, next, acceptanceM) {
+export function drawRoute({ ctx, toScreen, pxPerM, colour, labels }, route, next, acceptanceM) {
   const acceptancePx = acceptanceM * pxPerM;
   ctx.strokeStyle = colour("--route");
   ctx.lineWidth = 1.5;
@@ -28,11 +25,7 @@ export function drawRoute({ ctx, toScreen, pxPerM, colour }, route, next, accept
     ctx.arc(x, y, Math.max(acceptancePx, 4), 0, 7);
     ctx.stroke();
     ctx.globalAlpha = 1;
-    if (isNext) {
-      ctx.fillStyle = colour("--quiet");
-      ctx.font = FONT;
-      drawWords({ ctx, colour }, `${MAP_TEXTS.next} ${index + 1}`, x + Math.max(acceptancePx, 4) + 5, y + 4);
-    }
+    if (isNext) labels.add([`${MAP_TEXTS.next} ${index + 1}`], x + Math.max(acceptancePx, 4) + 5, y + 4, "--quiet");
   });
 }
 

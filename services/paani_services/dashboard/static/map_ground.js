@@ -1,22 +1,11 @@
 // @ts-check
-// Draws what lies under everything else on the map: the grid of metres, and over it the scale; and words, legible on any chart.
+// Draws what lies under everything else on the map: the grid of metres, and over it the scale.
 
 const ROUND_LENGTHS_M = [1, 2, 5, 10, 20, 50, 100, 200, 500];
 const GRID_PX = 56, SCALE_PX = 60, SCALE_ROOM_PX = 6;
 
 /** The least round length that is so wide on the screen. @param {number} pxPerM @param {number} leastPx */
 const roundLength = (pxPerM, leastPx) => ROUND_LENGTHS_M.find((m) => m * pxPerM >= leastPx) ?? 500;
-
-/** Words in the colour of what they name, with an edge of the map's ground. @param {{ctx: CanvasRenderingContext2D, colour: (name: string) => string}} chart @param {string} text @param {number} x @param {number} y */
-export function drawWords({ ctx, colour }, text, x, y) {
-  ctx.save();
-  ctx.strokeStyle = colour("--panel");
-  ctx.lineWidth = 4;
-  ctx.lineJoin = "round";
-  ctx.strokeText(text, x, y);
-  ctx.restore();
-  ctx.fillText(text, x, y);
-}
 
 /** @param {CanvasRenderingContext2D} ctx @param {import("./map_projection.js").MapProjection} projection @param {string} colour */
 export function drawGrid(ctx, projection, colour) {

@@ -1,15 +1,13 @@
 // @ts-check
 // Draws on the map what the boat is told and what it sees coming: fence, stations, rally points, home, the way ahead, moving obstacles.
 
-import { drawWords } from "./map_ground.js";
 import { MAP_TEXTS, ageText, trackNames } from "./text.js";
 
 const ARROW_S = 5; // a velocity is drawn as the way of this long
 const GHOST_S = 30; // no boat that nobody hears is said to go straight on for longer
-const FONT = "12px system-ui, sans-serif", LINE_PX = 15;
 
 /** Metres east and north to pixels. @typedef {(x: number, y: number) => [number, number]} ToScreen */
-/** turnRad: by which every direction is turned, counter-clockwise. @typedef {{ctx: CanvasRenderingContext2D, toScreen: ToScreen, turnRad: number, pxPerM: number, colour: (name: string) => string}} Chart */
+/** turnRad: by which every direction is turned, counter-clockwise. @typedef {{ctx: CanvasRenderingContext2D, toScreen: ToScreen, turnRad: number, pxPerM: number, colour: (name: string) => string, labels: import("./map_labels.js").MapLabels}} Chart */
 
 /** Areas to keep in are outlined, areas to keep out are hatched too. @param {Chart} chart @param {any} mission */
 export function drawFence({ ctx, toScreen, colour }, mission) {
@@ -88,7 +86,7 @@ export function drawHome({ ctx, toScreen, colour }, home) {
  * Where the boat may be by now that was heard of last as `pose`: straight on at its speed, in a circle that grows with it.
  * @param {Chart} chart @param {any} pose @param {number} ageS
  */
-export function drawGhost({ ctx, toScreen, pxPerM, colour }, pose, ageS) {
+export function drawGhost({ ctx, toScreen, pxPerM, colour, labels }, pose, ageS) {
   const goneS = Math.min(ageS, GHOST_S), wayM = pose.surge_mps * goneS;
   const [x, y] = toScreen(pose.x_m + wayM * Math.cos(pose.yaw_rad), pose.y_m + wayM * Math.sin(pose.yaw_rad));
   ctx.strokeStyle = ctx.fillStyle = colour("--red");
@@ -102,8 +100,7 @@ export function drawGhost({ ctx, toScreen, pxPerM, colour }, pose, ageS) {
   ctx.arc(x, y, Math.max(10, (Math.abs(wayM) + (pose.position_std_m ?? 0)) * pxPerM), 0, 7);
   ctx.stroke();
   ctx.setLineDash([]);
-  ctx.font = FONT;
-  drawWords({ ctx, colour }, `${MAP_TEXTS.notHeard} ${ageText(ageS)}`, x + 13, y - 13);
+  labels.add([`${MAP_TEXTS.notHeard} ${ageText(ageS)}`], x + 13, y - 13, "--red");
 }
 
 /** The way ahead by the order in force. @param {Chart} chart @param {{x_m: number, y_m: number}[]} path */
@@ -150,10 +147,7 @@ const isNearing = (obstacle) => obstacle.cpa_m !== undefined && obstacle.tcpa_s 
  * @param {Chart} chart @param {any[]} obstacles @param {any} pose of the boat @param {number} ageS of the message @param {{id: number, label: string}[]} tracks
  */
 export function drawObstacles(chart, obstacles, pose, ageS, tracks) {
-  const { ctx, toScreen, pxPerM, colour } = chart;
-  /** @type {Label[]} */
-  const labels = [];
-  ctx.font = FONT;
+  const { ctx, toScreen, pxPerM, colour, labels } = chart;
   for (const obstacle of obstacles) {
     if (pose && isNearing(obstacle)) drawClosest(chart, obstacle, pose, ageS);
     const [east, north] = placeAfter(obstacle, obstacle.east_mps, obstacle.north_mps, ageS);
@@ -171,23 +165,6 @@ export function drawObstacles(chart, obstacles, pose, ageS, tracks) {
     ctx.lineTo(...toScreen(east + obstacle.east_mps * ARROW_S, north + obstacle.north_mps * ARROW_S));
     ctx.stroke();
     const lines = [trackNames(tracks, [obstacle.track_id]), closestText(obstacle, ageS)].filter(Boolean);
-    labels.push({ lines, x: x + radius + 4, y: y + 4, width: Math.max(...lines.map((line) => ctx.measureText(line).width)) });
+    labels.add(lines, x + radius + 4, y + 4, "--text");
   }
-  ctx.fillStyle = colour("--text");
-  for (const { lines, x, y } of withoutOverlap(labels)) lines.forEach((line, index) => drawWords(chart, line, x, y + index * LINE_PX));
-}
-
-/** @typedef {{lines: string[], x: number, y: number, width: number}} Label its first line begins at a place of the screen */
-
-/** The labels from top to bottom, each as low as it has to be to lie on none before it. @param {Label[]} labels */
-function withoutOverlap(labels) {
-  /** @type {Label[]} */
-  const placed = [];
-  const height = (/** @type {Label} */ { lines }) => lines.length * LINE_PX;
-  for (const label of [...labels].sort((a, b) => a.y - b.y)) {
-    const findCovered = () => placed.find((other) => label.x < other.x + other.width && other.x < label.x + label.width && label.y < other.y + height(other) && other.y < label.y + height(label));
-    for (let other = findCovered(); other; other = findCovered()) label.y = other.y + height(other);
-    placed.push(label);
-  }
-  return placed;
 }

@@ -7,6 +7,8 @@ import stat
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from paani import messages as m
 from paani.clock import ManualClock
 from paani.keys import STATION
