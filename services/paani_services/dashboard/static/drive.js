@@ -126,6 +126,9 @@ function bindKeys() {
   });
 }
 
+/** On a phone, picture and stick take the screen while its page drives by hand; after a frame it is laid out for them. */
+const showWhatOneDrivesBy = () => requestAnimationFrame(() => requestAnimationFrame(() => byId("panels").scrollIntoView()));
+
 export function bindDrive() {
   for (const mode of Object.keys(MODE_TEXTS)) {
     const button = make("button");
@@ -146,6 +149,7 @@ export function bindDrive() {
   bindStick();
   bindKeys();
   addEventListener("blur", () => letGo());
+  matchMedia("(orientation: portrait)").addEventListener("change", () => canDrive && showWhatOneDrivesBy());
   addEventListener("pagehide", () => letGo(true));
   document.addEventListener("visibilitychange", () => document.hidden && letGo(true));
   setInterval(() => !document.hidden && void say(), SAY_MS);
@@ -161,7 +165,8 @@ export function renderDrive(store, open, now, isAway) {
   canDrive = mayDrive;
   if (!canDrive) isPadFree = false;
   else renderStick();
-  byId("drive").dataset.driving = String(canDrive);
+  const { dataset } = byId("drive"), begins = canDrive && dataset.driving !== "true";
+  dataset.driving = String(canDrive);
   setText(byId("drive-wheel"), operator ? `${name} ${WHEEL_TEXTS.holds}` : WHEEL_TEXTS.silent);
   byId("drive-take").hidden = !operator || isHolder || isFree;
   for (const button of /** @type {NodeListOf<HTMLButtonElement>} */ (document.querySelectorAll("[data-drive]"))) {
@@ -172,6 +177,7 @@ export function renderDrive(store, open, now, isAway) {
     setText(button.querySelector("span"), reason || MODE_TEXTS[mode][1]);
   }
   byId("drive-hand").hidden = !canDrive;
+  if (begins) showWhatOneDrivesBy();
   const leftS = operator ? operator.override_ms / 1000 : 0;
   setText(byId("drive-override"), leftS > 0 ? DRIVE_TEXTS.overridden(fixed(leftS, 0)) : DRIVE_TEXTS.override);
   byId("drive-override").dataset.on = String(leftS > 0);

@@ -19,6 +19,7 @@ import { bindPalette, nextPalette } from "./palette.js";
 import { requireSession } from "./requests.js";
 import { bindRecordings } from "./recordings.js";
 import { bindSettings } from "./settings.js";
+import { bindRoom } from "./room.js";
 import { connect } from "./socket.js";
 import { bindTabs, isDriveTab } from "./tabs.js";
 import { Time, isTyping } from "./time.js";
@@ -111,6 +112,7 @@ bindDevices();
 bindHealth();
 bindOperatorControls();
 bindDrive();
+bindRoom();
 connect(onMessage, onOpen);
 setInterval(render, RENDER_PERIOD_MS);
 Object.defineProperty(window, "paani", {
