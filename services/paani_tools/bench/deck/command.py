@@ -28,15 +28,23 @@ from paani_tools.up.terminal import Display
 
 LINK_MS = 50.0  # each way
 MANY = 10
+MAX_RATE_HZ = 10  # the page is sent no more (dashboard.picture_rate_hz)
 HERE, CROWDED, LINK = "with 1 client", f"with {MANY} clients", f"over a link of {LINK_MS:g} ms each way"
 
 
-def main(argv: list[str]) -> int:
-    """Exit codes: 0 every bar was kept, 1 one was not or could not be measured, 2 user's mistake."""
+def deck_parser() -> argparse.ArgumentParser:
+    """The options."""
     parser = argparse.ArgumentParser(
         prog="paani bench deck", description="The page in headless Chromium beside a simulated boat under way."
     )
     parser.add_argument("--world", help="a world or a scenario (default: lake)", default="lake")
+    parser.add_argument(
+        "--rate",
+        type=whole_number(most=MAX_RATE_HZ),
+        default=10,
+        metavar="HZ",
+        help="pictures a second of the simulated camera, all of which perception looks at; default: 10",
+    )
     parser.add_argument("--loads", type=whole_number(), default=5, metavar="N", help="of the page; default: 5")
     parser.add_argument("--stops", type=whole_number(), default=20, metavar="N", help="each way and round; default: 20")
     parser.add_argument("--sticks", type=whole_number(), default=40, metavar="N", help="default: 40")
@@ -51,9 +59,20 @@ def main(argv: list[str]) -> int:
     parser.add_argument("--heap", type=seconds, metavar="S", help="leave a page open for so long, and watch its heap")
     parser.add_argument("--json", type=output_file("--json"), metavar="FILE", help="write the figures there too")
     add_config_arguments(parser)
-    options = parser.parse_args(argv)
+    return parser
+
+
+def deck_config(options: argparse.Namespace) -> Config:
+    """The simulated boat that is measured. Raises UserError."""
+    rates = tuple(f"{name}.rate_hz={options.rate}" for name in ("camera", "eye", "perception"))
+    return config_from(options, (*up_sets(world=options.world, camera=None, headless=False), *rates))
+
+
+def main(argv: list[str]) -> int:
+    """Exit codes: 0 every bar was kept, 1 one was not or could not be measured, 2 user's mistake."""
+    options = deck_parser().parse_args(argv)
     require_modules("bench deck", "playwright")
-    config = config_from(options, up_sets(world=options.world, camera=None, headless=False))
+    config = deck_config(options)
     if is_page_exposed(config):
         raise UserError(f"dashboard.host {config.dashboard.host}: this bench measures a page on the loopback interface")
     report = asyncio.run(_measure(config, options))
@@ -100,6 +119,8 @@ async def _measure(config: Config, options: argparse.Namespace) -> DeckReport | 
             heap = await measuring.watch_heap(chromium, options.heap or 0.0)
             reports.append(
                 DeckReport(
+                    camera_hz=plan.config.camera.rate_hz,
+                    received_hz=len(timed.received_ms) / options.seconds,
                     loads=tuple(loads),
                     received_ms=percentiles(timed.received_ms),
                     drawn_ms=percentiles(timed.drawn_ms),

@@ -34,13 +34,17 @@ class Ratio(msgspec.Struct, frozen=True):
 
 
 class DeckReport(msgspec.Struct, frozen=True, kw_only=True):
-    """Times in ms. `received_ms`: from the picture's stamp aboard until a client that only reads has it; `drawn_ms`:
-    until it is on the screen, with its evidence; `stage_ms`: by stage, see `picture_path`; `beyond_ms`: from where the
-    simulated camera has drawn it; `alone_ms`: the same without overlays, which needs no evidence. `stop_ms`: from the
-    press until the thrust adapter says zero, by what stands between; `stop_ratio`: of its medians, with many clients
-    over one. `unanswered`: presses and sticks that nothing followed.
+    """Times in ms. `camera_hz`: pictures a second that the camera was set to; `received_hz`: that came to a client.
+
+    `received_ms`: from the picture's stamp aboard until a client that only reads has it; `drawn_ms`: until it is on
+    the screen, with its evidence; `stage_ms`: by stage, see `picture_path`; `beyond_ms`: from where the simulated
+    camera has drawn it; `alone_ms`: the same without overlays, which needs no evidence. `stop_ms`: from the press
+    until the thrust adapter says zero, by what stands between; `stop_ratio`: of its medians, with many clients over
+    one. `unanswered`: presses and sticks that nothing followed.
     """
 
+    camera_hz: float
+    received_hz: float
     loads: tuple[PageLoad, ...]
     received_ms: Percentiles
     drawn_ms: Percentiles
@@ -112,6 +116,7 @@ def deck_text(report: DeckReport) -> str:
     rows = [
         ("page load until live", f"{loads[0]:.0f} to {loads[-1]:.0f} ms (n = {len(loads)})"),
         ("page load, files and bytes", f"{report.loads[0].files}, {report.loads[0].bytes / 1024:.0f} KiB"),
+        ("pictures a second, of the camera and to a client", f"{report.camera_hz:g} and {report.received_hz:.1f}"),
         ("picture to a client", _spread(report.received_ms)),
         ("picture to the screen", _spread(report.drawn_ms)),
         *((f"of which {name}", _spread(figures)) for name, figures in report.stage_ms.items()),

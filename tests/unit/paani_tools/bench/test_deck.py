@@ -7,7 +7,7 @@ from msgspec.structs import replace
 
 from paani import messages as m
 from paani.errors import UserError
-from paani_tools.bench.deck.command import main, silence_text
+from paani_tools.bench.deck.command import deck_config, deck_parser, main, silence_text
 from paani_tools.bench.deck.loads import PageLoad
 from paani_tools.bench.deck.measuring import is_stopped
 from paani_tools.bench.deck.page_probe import page_moments
@@ -36,6 +36,8 @@ BOAT = BoatMoments(
 )
 PAGE = PageMoments(frame_seq=7, evidence_us=61e3, mask_us=65e3, decoded_us=67e3, drawn_us=75e3, shown_us=90e3)
 KEPT = DeckReport(
+    camera_hz=10.0,
+    received_hz=9.8,
     loads=(PageLoad(load_ms=410.0, files=40, bytes=204_800), PageLoad(load_ms=390.0, files=40, bytes=204_800)),
     received_ms=percentiles([20.0, 30.0]),
     drawn_ms=percentiles([120.0, 130.0]),
@@ -126,7 +128,8 @@ def test_a_picture_that_was_drawn_before_its_mask_has_no_stages() -> None:
 
 def test_every_figure_is_told_with_its_count() -> None:
     text = deck_text(KEPT)
-    for words in ("390 to 410 ms (n = 2)", "40, 200 KiB", "p99 150 ms (n = 2)", "with 10 clients | 30.0 % of a core",
+    for words in ("390 to 410 ms (n = 2)", "of the camera and to a client | 10 and 9.8",
+                  "40, 200 KiB", "p99 150 ms (n = 2)", "with 10 clients | 30.0 % of a core",
                   "+1.2 MiB/h over 1800 s", "without answer: 0; load 0.50 before, 2.00 after",
                   "of which inference | p50 20, p95 20",
                   "with evidence | p50 40, p95 60, p99 60 ms (n = 2); bar p95 60 ms: kept",
@@ -152,8 +155,25 @@ def test_what_did_not_answer_is_told_in_one_line(error: Exception, end: str) -> 
     assert "\n" not in text
 
 
+@pytest.mark.parametrize(
+    ("words", "rate_hz"), [([], 10.0), (["--rate", "5"], 5.0), (["--rate", "5", "--set", "camera.rate_hz=4"], 4.0)]
+)
+def test_the_camera_gives_ten_pictures_a_second_or_as_many_as_asked(words: list[str], rate_hz: float) -> None:
+    config = deck_config(deck_parser().parse_args(words))
+    assert config.camera.rate_hz == rate_hz
+    assert config.eye.rate_hz == config.perception.rate_hz == max(rate_hz, 5.0)
+    assert config.dashboard.picture_rate_hz >= rate_hz
+
+
 def test_options_that_are_none_end_with_2(capsys: pytest.CaptureFixture[str]) -> None:
-    for words in (["--stops", "0"], ["--for", "-1"], ["--heap", "nan"], ["--heap", "0"]):
+    for words in (
+        ["--stops", "0"],
+        ["--for", "-1"],
+        ["--heap", "nan"],
+        ["--heap", "0"],
+        ["--rate", "11"],
+        ["--rate", "0"],
+    ):
         with pytest.raises(SystemExit) as ended:
             main(words)
         assert ended.value.code == 2
