@@ -50,6 +50,8 @@ PIXEL = """([x, y]) => {
   return [...c.getContext("2d").getImageData(Math.round(x * c.width), Math.round(y * c.height), 1, 1).data].slice(0, 3);
 }"""
 
+LIMITS = "[...document.querySelectorAll('.lane u')].map((mark) => (parseFloat(mark.style.left) / 100).toFixed(2))"
+
 
 class Watched:
     """A page, its console errors, and its requests to other hosts."""
@@ -102,6 +104,14 @@ async def check_own_hull_and_opacity(page: Any) -> None:
     await page.keyboard.press("5")
     await page.wait_for_timeout(300)
     assert is_colour(await page.evaluate(PIXEL, place), blend(WATER_RGBA))
+    await page.keyboard.press("2")
+    await page.wait_for_timeout(300)
+    assert is_colour(await page.evaluate(PIXEL, [BOX[0], 0.4]), blend(WATER_RGBA)), "no box"
+    await page.keyboard.press("2")
+    await page.click("[data-layer=mask]")
+    await page.wait_for_timeout(300)
+    assert is_colour(await page.evaluate(PIXEL, place), PICTURE_BGR[::-1]), "no mask"
+    await page.click("[data-layer=mask]")
     await page.fill("#camera-opacity", "0")
     await page.wait_for_timeout(300)
     assert is_colour(await page.evaluate(PIXEL, place), PICTURE_BGR[::-1])
@@ -168,6 +178,14 @@ async def test_the_overlay_lies_on_its_own_frame(
         assert await page.evaluate("[...document.querySelectorAll('.lane .verdict')].map(e => e.textContent)") == [
             "blocked", "blocked", "clear",
         ]  # fmt: skip
+        steps = await page.evaluate("[...document.querySelectorAll('#path li')].map((e) => e.dataset.step)")
+        assert steps == ["passed", "passed", "passed", "decided", ""], "the branch taken"
+        assert (await page.inner_text("#path [data-step=decided]")) == "Centre risk"
+        assert await page.evaluate(LIMITS) == ["0.58", "0.48", "0.58"], "each lane against its own limit"
+        parts = await page.evaluate("document.querySelector('.lane .parts').textContent.replace(/\\s+/g, ' ')")
+        assert "N 0.90" in parts
+        assert "O 0.50" in parts
+        assert await page.inner_text("#tracks span") == "#4 buoy 0.80 accepted"
         assert (tmp_path / "page.png").stat().st_size > 20_000
         assert watched.errors == []
         assert watched.foreign_requests == []

@@ -199,6 +199,7 @@ async def test_a_mission_is_drawn_checked_and_sent_as_one(
         await editor.until_note("Nothing is wrong")
         await editor.choose("+ Hold")
         await editor.press((0, -14))
+        await editor.choose("+ Return")
         await editor.choose("+ Rally")
         await editor.press((-14, -14))  # beside the one in force
         await page.click("#editor-send")
@@ -206,7 +207,11 @@ async def test_a_mission_is_drawn_checked_and_sent_as_one(
         async with asyncio.timeout(5.0):
             while accepted.value is None or not accepted.value.legs:
                 await accepted.next()
-        assert [leg.kind for leg in accepted.value.legs] == [m.LegKind.FOLLOW_ROUTE, m.LegKind.HOLD_STATION]
+        assert [leg.kind for leg in accepted.value.legs] == [
+            m.LegKind.FOLLOW_ROUTE,
+            m.LegKind.HOLD_STATION,
+            m.LegKind.RETURN_HOME,
+        ]
         drawn = [(point.x_m, point.y_m) for point in accepted.value.legs[0].waypoints]
         assert await editor.points() == [(round(x_m, 1), round(y_m, 1)) for x_m, y_m in drawn]
         assert len(accepted.value.fence) == 2
@@ -237,7 +242,11 @@ async def test_a_mission_is_drawn_checked_and_sent_as_one(
                 waypoint = frame.waypoint_of(point, "point")
                 assert (waypoint.x_m, waypoint.y_m) == pytest.approx((x_m, y_m), abs=0.01)
             await editor.choose("+ Stop")
-            await page.set_input_files("#editor-file", str(path))
+            if kind == "GPX":
+                await page.set_input_files("#editor-file", str(path))
+            else:
+                text = await asyncio.to_thread(path.read_text, encoding="utf-8")
+                await page.evaluate(DROP, [path.name, text])
             await until(page, "paani.plan.legs.length === 1")
             assert await page.evaluate("paani.plan.rally[0].waypoints.length") == 2
             assert await editor.points() == [(round(x_m, 1), round(y_m, 1)) for x_m, y_m in drawn]

@@ -89,6 +89,10 @@ async def test_a_press_shows_that_moment_everywhere(
         await page.click("#past-live-button")
         assert await page.evaluate("paani.shownUs") is None
         await until(page, f"document.querySelector('#past').hidden && {SPEED} === '1.25'")
+        await page.click("#plots .u-over >> nth=0")
+        await until(page, f"!document.querySelector('#past').hidden && paani.shownUs > {begun_us}")
+        await page.click("#past-live-button")
+        await until(page, "document.querySelector('#past').hidden")
         await page.click("#time-plots")
         await hold_to_arm(page)
         await wait_for_arming(boat, armed=True, stopped=False)
