@@ -189,8 +189,8 @@ async def test_an_override_is_logged_when_it_begins_and_when_it_ends(
     await desk.order(m.RequestAct.OVERRIDE, 92)
     await desk.order(m.RequestAct.DRIVE, 93)
     await desk.ask(m.RequestAct.STOP)
-    said = [record.getMessage() for record in caplog.records if "overrid" in record.getMessage()]
-    assert said == ["dashboard overrides the advice for 10 s", "the advice is no longer overridden: DISARMED"]
+    lines = [record.getMessage() for record in caplog.records if "overrid" in record.getMessage()]
+    assert lines == ["dashboard overrides the advice for 10 s", "the advice is no longer overridden: DISARMED"]
     assert desk.states.messages[-1].override_end is m.OverrideEnd.DISARMED
 
 
