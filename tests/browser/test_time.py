@@ -26,6 +26,14 @@ HISTORY_US = """fetch("/api/history").then((answer) => answer.json()).then(({ sa
   return [at.at(-1), at[column("speed_mps").lastIndexOf(0.5)]];
 })"""
 SPAN_US = 600e6  # of the strip
+AMBER, RED = "227,179,65", "255,113,118"
+# The colours in the middle of a row of the strip, within the newest half minute.
+NEWEST_OF_ROW = """(row) => {
+  const strip = document.querySelector("#time-strip"), { width, height } = strip, newest = Math.round(width / 20);
+  const y = Math.round(((row + 0.5) * height) / 4);
+  const { data } = strip.getContext("2d").getImageData(width - newest, y, newest, 1);
+  return Array.from({ length: data.length / 4 }, (_, i) => data.slice(4 * i, 4 * i + 3).join());
+}"""
 
 
 async def press_strip(page: Any, part: float) -> None:
@@ -42,6 +50,8 @@ async def test_a_press_shows_that_moment_everywhere(
         await until(page, f"{SPEED} === '0.50' && paani.overlay.mask_seq !== null")
         await until(page, "!document.querySelector('#time-back').disabled")
         begun_us, _ = await page.evaluate(HISTORY_US)
+        for row, colour in ((0, AMBER), (1, RED)):
+            await until(page, f"({NEWEST_OF_ROW})({row}).includes('{colour}')")  # RIGHT is advised, a STOP holds
         await page.wait_for_timeout(3000)
         assert guidance.odometry is not None
         before = boat.seq
@@ -89,6 +99,7 @@ async def test_a_press_shows_that_moment_everywhere(
         await page.click("#past-live-button")
         assert await page.evaluate("paani.shownUs") is None
         await until(page, f"document.querySelector('#past').hidden && {SPEED} === '1.25'")
+        await until(page, f"({NEWEST_OF_ROW})(2).includes('{RED}')")  # the STOP
         await page.click("#plots .u-over >> nth=0")
         await until(page, f"!document.querySelector('#past').hidden && paani.shownUs > {begun_us}")
         await page.click("#past-live-button")
