@@ -25,7 +25,7 @@ def load_exported(model: nn.Module, path: Path, pictures: Tensor) -> None:
     pictures: float32 [N,3,H,W] as the network gets them, whose statistics the normalisations take.
     Raises UserError where the file is no export of this net.
     """
-    stored = _read_convolutions(path)
+    stored = _read_convolutions(path, _find_fixed_weights(model))
     convs = _order_by_execution(model, pictures[:1])
     if len(stored) != len(convs):
         raise UserError(f"{path}: {len(stored)} convolutions, expected {len(convs)}")
@@ -45,7 +45,13 @@ def load_exported(model: nn.Module, path: Path, pictures: Tensor) -> None:
     _take_statistics(model, {conv: norms[conv] for conv in biases}, biases, pictures)
 
 
-def _read_convolutions(path: Path) -> list[tuple[Tensor, Tensor]]:
+def _find_fixed_weights(model: nn.Module) -> frozenset[str]:
+    """Names of the weights that training leaves as they are; an export keeps them, and the model has them already."""
+    return frozenset(name for name, weight in model.named_parameters() if not weight.requires_grad)
+
+
+def _read_convolutions(path: Path, fixed: frozenset[str]) -> list[tuple[Tensor, Tensor]]:
+    """Weight and bias of each convolution but those with a fixed weight, in the file's order."""
     try:
         graph = onnx.load(str(path)).graph
     except Exception as error:
@@ -53,7 +59,7 @@ def _read_convolutions(path: Path) -> list[tuple[Tensor, Tensor]]:
     constants = {tensor.name: numpy_helper.to_array(tensor) for tensor in graph.initializer}
     pairs = []
     for node in graph.node:
-        if node.op_type == "Conv":
+        if node.op_type == "Conv" and node.input[1] not in fixed:
             if len(node.input) < 3 or any(name not in constants for name in node.input[1:3]):
                 raise UserError(f"{path}: {node.name}: a convolution without stored weight and bias")
             weight, bias = (torch.tensor(constants[name]) for name in node.input[1:3])
@@ -76,11 +82,10 @@ def _order_by_execution(model: nn.Module, picture: Tensor) -> list[nn.Conv2d]:
 
 
 def _find_following_norms(model: nn.Module) -> dict[nn.Conv2d, nn.BatchNorm2d]:
-    """Find the normalisation that follows each convolution; both stand side by side in a `Sequential`."""
+    """Find the normalisation that follows each convolution; both stand side by side in a block."""
     found = {}
     for block in model.modules():
-        layers = list(block.children()) if isinstance(block, nn.Sequential) else []
-        for first, second in pairwise(layers):
+        for first, second in pairwise(block.children()):
             if isinstance(first, nn.Conv2d) and isinstance(second, nn.BatchNorm2d):
                 found[first] = second
     return found

@@ -16,8 +16,9 @@ from paani_models.catalogue import PAPER_WEIGHTS, WEIGHTS, verified_path  # noqa
 from paani_models.commands.models import main  # noqa: E402
 from paani_models.detector import train as detector_train  # noqa: E402
 from paani_models.detector.data import BoxedPicture  # noqa: E402
+from paani_models.detector.paper_network import Yolo11n  # noqa: E402
 from paani_models.detector.shipped_network import Detector  # noqa: E402
-from paani_models.network_input import segmenter_batch, segmenter_input  # noqa: E402
+from paani_models.network_input import SIZE_WH, detector_input, segmenter_batch, segmenter_input  # noqa: E402
 from paani_models.recipes.onnx_export import (  # noqa: E402
     CONTRACTS,
     SmallerInside,
@@ -329,6 +330,14 @@ def test_the_papers_segmenter_says_the_same_in_pytorch_as_in_its_file_v8() -> No
     file = verified_path("segmenter", PAPER_WEIGHTS)
     inputs = [segmenter_input(pictures.river(seed)) for seed in range(4)]
     net = PaperSegmenter()
+    load_exported(net, file, torch.from_numpy(np.concatenate(inputs)))
+    assert largest_export_difference(net.eval(), file, inputs) < 1e-3
+
+
+def test_the_papers_detector_says_the_same_in_pytorch_as_in_its_file_v3() -> None:
+    file = verified_path("detector", PAPER_WEIGHTS)
+    inputs = [detector_input(pictures.river(seed), SIZE_WH) for seed in range(4)]
+    net = Yolo11n()
     load_exported(net, file, torch.from_numpy(np.concatenate(inputs)))
     assert largest_export_difference(net.eval(), file, inputs) < 1e-3
 
