@@ -36,7 +36,8 @@ TRAINED = "the paper's, trained here"
 BANDED = "recovered masks leave a band between the classes undecided, so that edges are not scored"
 INT8_NOTE = "What ships is FP32: INT8 has to pass an acceptance test (`paani models quantise`)."
 PAPER_SEGMENTER = "paper-segmenter"
-NO_COUNTERPART = "no second artifact and no test split here"
+UNFINISHED = "It had 16 of its recipe's 60 epochs, from random weights, not COCO's, and without rendered pictures."
+NO_COUNTERPART = "no test part here; what was judged above is the ONNX file"
 MASK_SOURCE = "mastr1325"
 BLACK = m.UnusableCause.BLACK
 
@@ -53,7 +54,8 @@ def detector_table(detector: Model, whose: str) -> FigureTable:
         )
     for statement, what, printed in published.DETECTOR_OTHERS:
         rows.append((statement, what, printed, None, 0, NO_COUNTERPART))
-    return FigureTable(name=f"Detector: {whose}", columns=COLUMNS, rows=tuple(rows), note=OTHER_DATA)
+    note = f"{OTHER_DATA} {UNFINISHED}" if whose == TRAINED else OTHER_DATA
+    return FigureTable(name=f"Detector: {whose}", columns=COLUMNS, rows=tuple(rows), note=note)
 
 
 def network_table(detector: Model, segmenter: Model, whose: str) -> FigureTable:

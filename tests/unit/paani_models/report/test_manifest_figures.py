@@ -63,6 +63,29 @@ def test_detector_figures_are_reproduced_u1_u2() -> None:
 
 @pytest.mark.data
 @needs_data
+@pytest.mark.parametrize(
+    ("label", "source", "ap50", "ap50_95", "n"),
+    [
+        ("person", "lifeguard_swim", 0.471, 0.157, 75),
+        ("vessel", "typesofships_kayak_buoy", 0.562, 0.189, 70),
+        ("vessel", "tunai_sooke", 0.0, 0.0, 21),
+        ("pier", "tampere_pier", 0.298, 0.093, 23),
+        ("buoy", "uon_robotx", 0.692, 0.308, 39),
+    ],
+)
+def test_the_papers_detector_trained_here_has_the_stated_figures_v1_v4_v5_v6_v7(
+    label: str, source: str, ap50: float, ap50_95: float, n: int
+) -> None:
+    measured = measure_detector(verified_path("detector", PAPER_WEIGHTS), held_out(source))
+    expected = recorded("detector", source, PAPER_WEIGHTS)
+    for metric, stated in ((f"{label}_ap50", ap50), (f"{label}_ap50_95", ap50_95)):
+        (found,) = (figure for figure in measured if (figure.metric, figure.source) == (metric, source))
+        assert (found.value, expected[metric].value) == pytest.approx((stated, stated), abs=0.002)
+        assert found.n == expected[metric].n == n
+
+
+@pytest.mark.data
+@needs_data
 def test_water_is_water_on_rivers_never_seen_in_training() -> None:
     """USVInland, six held-out sequences; Tampere, one."""
     for name in ("tbiseg_usvinland", "tbiseg_tampere"):

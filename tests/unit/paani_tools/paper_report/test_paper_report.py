@@ -123,6 +123,28 @@ def test_the_papers_networks_trained_here_stand_beside_the_papers_figures() -> N
         assert TRAINED in part.name
 
 
+def test_what_the_papers_detector_reaches_here_is_said_beside_the_papers_figures() -> None:
+    """Of all held-out boxes, each with its number and how many of them are rendered."""
+    detector = load_catalogue(PAPER_WEIGHTS)["detector"]
+    figures = {(each.metric, each.source): each for each in detector.figures}
+    table = detector_table(detector, TRAINED)
+    here = dict(zip(column(table, "figure"), column(table, "here"), strict=True))
+    assert f"mAP50 {here['AP50, mean']:.3f} and mAP50-95 {here['AP50-95, mean']:.3f}" in SAYS["V1"]
+    all_n = drawn_n = 0
+    for label in CLASSES:
+        fifty, over, drawn = (
+            figures[f"{label}_{metric}", source]
+            for metric, source in (("ap50", "all"), ("ap50_95", "all"), ("ap50_95", "rendered"))
+        )
+        statement = SAYS[published.DETECTOR_STATEMENTS[label]]
+        assert f"AP50 {fifty.value:.3f} and AP50-95 {over.value:.3f} on {over.n} boxes, {drawn.n} of them" in statement
+        assert here[f"AP50-95, {label}"] == over.value
+        all_n, drawn_n = all_n + over.n, drawn_n + drawn.n
+    assert f"on {all_n:,} boxes, {drawn_n:,} of them" in SAYS["V1"]
+    assert "16 of its recipe's 60 epochs" in table.note
+    assert not any(origin.name == "rendered" for origin in detector.origins)
+
+
 def test_int8_of_the_papers_segmenter_stands_beside_the_papers_figures() -> None:
     trained = Experiment("paper-segmenter", "0", "eighty pictures", (Figure("miou", "mastr1325", 0.9, 24),))
     quantised = msgspec.structs.replace(trained, figures=(Figure("miou", "mastr1325", 0.8, 24),), inference="INT8")
