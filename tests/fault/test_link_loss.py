@@ -24,6 +24,7 @@ pytestmark = [pytest.mark.fault, pytest.mark.timeout(240)]
 ZERO_S = 0.5
 BACK_S = 5.0
 LOST_S = 4.0
+BY_LINK = {m.ZeroCause.PULSE_LOST, m.ZeroCause.TIMEOUT, m.ZeroCause.STALE_ECHO}
 LOSSES_S = range(15, 150, 15)  # the first that finds the boat under way is looked at
 BEFORE_S = 0.5
 READY_S = 90.0
@@ -106,7 +107,9 @@ async def test_a_lost_link_stops_the_running_boat(bus_config: BusConfig) -> None
     late = [(force, cause) for at_s, force, cause in during if at_s > lost_s + ZERO_S]
     assert len(late) > 50
     assert {force for force, _ in late} == {0.0}
-    assert {cause for _, cause in late} <= {m.ZeroCause.PULSE_LOST, m.ZeroCause.TIMEOUT, m.ZeroCause.STALE_ECHO}
+    causes = {cause for _, cause in late}
+    assert causes & BY_LINK
+    assert causes <= BY_LINK | {m.ZeroCause.ARMING_LOST}  # the operator's word, on the host, may be late on its own
     assert back_s <= BACK_S
     assert any(m.Inhibit.NO_CLOCK in command.inhibits for command in watch.commands)
 

@@ -28,7 +28,7 @@ from paani_tools.replay.recompute import Recomputation
 from paani_tools.replay.verify import losses_of
 
 OBSTACLES = 12  # the bar of the planning step is for so many
-MEMORY_S = 32.0  # of pictures before the first step that counts: nothing that is remembered is older
+MEMORY_S = 33.0  # of pictures before the first step that counts: nothing that is remembered is older
 PERIOD_US, START_US = 200_000, 1_000_000_000
 BOAT_MPS = 0.4  # the obstacles keep abreast of the boat: each moves, and stays in the picture
 COLUMNS, WIDTH_PX, HEIGHT_PX = 80, 320, 240

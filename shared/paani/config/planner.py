@@ -89,7 +89,7 @@ class PlannerConfig(Section, frozen=True):
     free_s: Positive = 0.8  # Q3
     occupied_s: Positive = 2.0  # Q3
     outvoted_by: Annotated[int, msgspec.Meta(ge=0, le=10_000)] = 2
-    hidden_s: NonNegative = 20.0
+    hidden_s: NonNegative = 30.0
     hidden_drift_m: NonNegative = 0.45  # Q6's drift allowance for 3 s
     thickness_m: Positive = 0.4  # of what ends the water, away from the boat
     person_room_m: NonNegative = 0.8  # kept around people: a swimmer's distance within `horizon_s`

@@ -191,10 +191,11 @@ def test_cells_out_of_sight_stay_occupied_longer() -> None:
     """A boat that turned away remembers a bar for `hidden_s`; the paper's lifetimes forget it."""
     memory = observe_from(edge=water_edge_of(AT_REST, AHEAD_5_M))
     away = BoatPose(0.0, 0.0, 1.5)
-    for later_us in range(200_000, 21_000_000, 200_000):
+    hidden_us = round(PLANNER.hidden_s * 1e6)
+    for later_us in range(200_000, hidden_us + 1_000_000, 200_000):
         memory = observe_from(away, at_us=START_US + later_us, memory=memory)
         hidden = cell(grid_of(memory, 0.0), 5.0, 0.0)
-        assert hidden == ("occupied" if later_us <= 20_000_000 else "unknown")
+        assert hidden == ("occupied" if later_us <= hidden_us else "unknown")
         paper = build_occupancy_grid(memory.observations, (0.0, 0.0), memory.observations[-1].stamp_us, CAMERA, PAPER)
         assert cell(paper, 5.0, 0.0) == ("occupied" if later_us <= 2_000_000 else "unknown")
 
