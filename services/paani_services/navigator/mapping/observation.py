@@ -21,7 +21,7 @@ BOX_STEPS = 512  # of the picture's width and height, in which boxes are stored
 POSE_SPACING_US = 90_000  # between two remembered poses, at least
 MAX_POSES = 14  # they span 1.2 s, which is longer than a picture takes to become evidence
 OBSERVATION_SPACING_US = 100_000  # between two remembered observations, at least
-OLD_OBSERVATION_SPACING_US = 1_200_000  # between those kept for what is out of sight
+OLD_OBSERVATIONS = 25  # kept for what is out of sight, evenly over `hidden_s`; more cost time in every plan
 BOX_SPACING_US = 190_000  # between those kept for their boxes alone
 MAX_OBSERVATIONS = 224
 OUTLINE_POINTS = 9  # of a box's waterline
@@ -333,17 +333,14 @@ def _prune_observations(observations: tuple[Observation, ...], config: PlannerCo
     """
     newest_us = observations[-1].stamp_us
     kept: list[Observation] = []
-    old_us = last_us = -OLD_OBSERVATION_SPACING_US
+    old_spacing_us = round(config.hidden_s * 1e6 / OLD_OBSERVATIONS)
+    old_us = last_us = -old_spacing_us
     for observation in observations:
         age_s = (newest_us - observation.stamp_us) * 1e-6
         is_apart = observation.stamp_us - last_us >= BOX_SPACING_US
         if age_s <= config.occupied_s:
             kept.append(observation)
-        elif (
-            age_s <= config.hidden_s
-            and observation.water_edge
-            and observation.stamp_us - old_us >= OLD_OBSERVATION_SPACING_US
-        ):
+        elif age_s <= config.hidden_s and observation.water_edge and observation.stamp_us - old_us >= old_spacing_us:
             kept.append(observation)
             old_us = last_us = observation.stamp_us
         elif age_s <= config.fit_s + config.unseen_s and observation.boxes and is_apart:

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from paani.messages import Odometry, SegmentationSource, TimeBase
 from paani_services.navigator.mapping.observation import (
+    OLD_OBSERVATIONS,
     ObservationMemory,
     interpolate_pose,
     is_free_space_evidence,
@@ -136,3 +137,17 @@ def test_every_picture_in_use_is_projected_once_and_few_others_are_kept() -> Non
     assert project_to_cells.cache_info().misses == made.misses
     assert made.maxsize is not None
     assert made.maxsize <= 2 * len(memory.observations)
+
+
+@pytest.mark.parametrize("hidden_s", [10.0, 20.0, 30.0, 60.0])
+def test_the_old_pictures_kept_reach_back_as_far_as_asked_and_are_as_many(hidden_s: float) -> None:
+    """What a plan costs does not grow with how long it is remembered what stands."""
+    config, memory = msgspec.structs.replace(PLANNER, hidden_s=hidden_s), ObservationMemory()
+    for k in range(round((hidden_s + 5.0) / 0.2)):
+        at_us = START_US + k * 200_000
+        seen = msgspec.structs.replace(evidence(at_us, water_edge_of(AT_REST)), frame_seq=k)
+        memory = update_memory(memory, odometry(at_us, AT_REST), seen, config)
+    newest_us = memory.observations[-1].stamp_us
+    ages_s = [(newest_us - each.stamp_us) * 1e-6 for each in memory.observations if each.water_edge]
+    assert 20 <= sum(age_s > config.occupied_s for age_s in ages_s) <= OLD_OBSERVATIONS
+    assert hidden_s - 0.1 * hidden_s <= max(ages_s) <= hidden_s
