@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import stat
 from pathlib import Path
 from typing import Any
@@ -183,6 +184,7 @@ async def test_a_stop_ends_manual_and_arming_again_does_not_bring_it_back(tmp_pa
 async def test_an_override_is_logged_when_it_begins_and_when_it_ends(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
+    caplog.set_level(logging.INFO)
     desk = Desk(tmp_path)
     await desk.arm(1)
     await desk.order(m.RequestAct.MODE, 91, m.DriveMode.MANUAL)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 import resource
+import subprocess
 import tty
 from pathlib import Path
 from types import SimpleNamespace
@@ -99,8 +100,12 @@ async def test_a_process_refused_memory_is_followed_until_it_has_spoken_long_aft
 
 async def test_a_process_without_descriptors_is_given_none_that_it_has_not_and_has_them_back() -> None:
     fault = next(fault for fault in faults_of(Drive.PLAIN) if fault.name == "no descriptors left")
-    process = await asyncio.create_subprocess_exec("sleep", "60")
+    process = await asyncio.create_subprocess_exec("cat", stdin=subprocess.PIPE, stdout=subprocess.PIPE)
     try:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        process.stdin.write(b"\n")
+        await process.stdout.readline()  # a program that is being started has the files of its libraries open
         loop, before = OneProcess(process.pid), resource.prlimit(process.pid, resource.RLIMIT_NOFILE)
         await fault.begin(loop)
         assert resource.prlimit(process.pid, resource.RLIMIT_NOFILE) == (3, before[1])  # input, output and errors
