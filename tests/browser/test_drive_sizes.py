@@ -29,9 +29,9 @@ OUT_OF_SIGHT = """(() => {
   const top = box(".bar").bottom, covers = [".orders", "#time"].map(box).filter((b) => b.top > top);
   const bottom = Math.min(innerHeight, ...covers.map((b) => b.top));
   return ["#camera", "#stick", "#drive-modes", "#drive-asks", "#drive-override", "#drive-note"].filter((name) => {
-    const b = box(name), shown = document.elementFromPoint((b.left + b.right) / 2, (b.top + b.bottom) / 2);
+    const b = box(name), topmost = document.elementFromPoint((b.left + b.right) / 2, (b.top + b.bottom) / 2);
     const isWhole = b.height > 0 && b.top >= top && b.bottom <= bottom && b.left >= 0 && b.right <= innerWidth;
-    return !isWhole || !shown?.closest(name);
+    return !isWhole || !topmost?.closest(name);
   });
 })()"""
 PICTURE_PX = "document.querySelector('#camera').clientWidth"
