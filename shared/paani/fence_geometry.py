@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from itertools import pairwise
+from typing import NamedTuple
 
 from paani import portable
 from paani.messages import FenceArea, Keep, Waypoint
@@ -17,6 +18,18 @@ PROBE_OFFSET_M = 0.01  # distance from an edge at which its sides are probed [m]
 
 Point = tuple[float, float]  # east and north in the map [m]
 Fence = tuple[FenceArea, ...]
+
+
+class BorderWords(NamedTuple):
+    """What a place beyond the border is said to be, what a leg does there, and the border's name."""
+
+    beyond: str
+    crosses: str
+    border: str
+
+
+FENCE_WORDS = BorderWords("is outside the fence", "leaves the fence", "the fence")
+LAND_WORDS = BorderWords("is on land", "crosses land", "land")
 
 
 def is_allowed(fence: Fence, at_m: Point) -> bool:
@@ -77,7 +90,12 @@ def return_bearing_rad(fence: Fence, at_m: Point) -> float | None:
 
 
 def find_route_violation(
-    fence: Fence, waypoints: tuple[Waypoint, ...], margin_m: float, *, repeat: bool = False
+    fence: Fence,
+    waypoints: tuple[Waypoint, ...],
+    margin_m: float,
+    *,
+    repeat: bool = False,
+    words: BorderWords = FENCE_WORDS,
 ) -> tuple[int, str] | None:
     """The first waypoint that is not allowed, or whose leg to the next is not or comes nearer than the margin.
 
@@ -86,14 +104,14 @@ def find_route_violation(
     points = [(waypoint.x_m, waypoint.y_m) for waypoint in waypoints]
     for number, point in enumerate(points):
         if not is_allowed(fence, point):
-            return number, "is outside the fence"
+            return number, words.beyond
         if not _is_clear(fence, point, point, margin_m):
-            return number, f"is nearer than {margin_m} m to the fence"
+            return number, f"is nearer than {margin_m} m to {words.border}"
     for number, (start, end) in enumerate(pairwise((*points, *points[:1]) if repeat else points)):
         if _exit_part(fence, start, end) is not None:  # both ends are allowed
-            return number, "the leg to the next leaves the fence"
+            return number, f"the leg to the next {words.crosses}"
         if not _is_clear(fence, start, end, margin_m):
-            return number, f"the leg to the next comes nearer than {margin_m} m to the fence"
+            return number, f"the leg to the next comes nearer than {margin_m} m to {words.border}"
     return None
 
 

@@ -9,14 +9,14 @@ import itertools
 import math
 from collections.abc import Iterable
 
-from paani.fence_geometry import Fence, do_segments_meet, find_route_violation
+from paani.fence_geometry import LAND_WORDS, Fence, do_segments_meet, find_route_violation
 from paani.messages import FenceArea, LegKind, Mission, MissionLeg, Route, Waypoint
 
 MAX_LEGS, MAX_LAPS = 100, 1_000_000
 MAX_WAYPOINTS = 10_000  # of a route or mission: the nearest leg is sought among all of them
 MIN_LEG_M = 0.01  # waypoints nearer to each other than this are the same: a leg this short has no direction
 MIN_RADIUS_M, MAX_RADIUS_M = 1.0, 1e3  # of a station; a boat would never rest within a radius below its own length
-MAX_CORNERS = 1000  # of all areas together: every edge is tested at each step of the navigator, ten times a second
+MAX_CORNERS = 1000  # of fence and land together: every edge is tested at each step of the navigator, ten times a second
 MAX_PAIRS = 1_000_000  # of a waypoint and a corner: each leg is tested against each edge, before a mission is accepted
 MAX_RALLY = 20
 MAX_RALLY_PAIRS = 5000  # of a rally point and a corner: the way to each is tested in the moment RETURN is ordered
@@ -39,19 +39,19 @@ def mission_of_route(route: Route) -> Mission:
 
 
 def find_mission_fault(
-    legs: tuple[MissionLeg, ...], fence: Fence, margin_m: float, rally: tuple[Waypoint, ...] = ()
+    legs: tuple[MissionLeg, ...], fence: Fence, margin_m: float, rally: tuple[Waypoint, ...] = (), land: Fence = ()
 ) -> str:
-    """Why the navigator could not take these legs and rally points within this fence; empty where it can.
+    """Why the navigator could not take these legs and rally points within this fence, off land; empty where it can.
 
     margin_m: the least distance of a waypoint, leg or rally point from an edge. No number is out of bounds.
     """
-    fault = _find_fence_fault(fence) or _find_legs_fault(legs) or _find_size_fault(legs, fence)
-    return fault or _find_violation(legs, fence, margin_m) or find_rally_fault(rally, fence, margin_m)
+    fault = _find_fence_fault(fence, land) or _find_legs_fault(legs) or _find_size_fault(legs, (*fence, *land))
+    return fault or _find_violation(legs, fence, margin_m, land) or find_rally_fault(rally, fence, margin_m, land)
 
 
-def find_rally_fault(rally: tuple[Waypoint, ...], fence: Fence, margin_m: float) -> str:
+def find_rally_fault(rally: tuple[Waypoint, ...], fence: Fence, margin_m: float, land: Fence = ()) -> str:
     """What is wrong with the first rally point that cannot be returned to; empty where nothing is."""
-    corners_n = sum(len(area.corners) for area in fence)
+    corners_n = _count_corners((*fence, *land))
     if len(rally) > MAX_RALLY:
         return f"rally: has {len(rally)}, more than {MAX_RALLY}"
     if len(rally) * corners_n > MAX_RALLY_PAIRS:
@@ -60,22 +60,24 @@ def find_rally_fault(rally: tuple[Waypoint, ...], fence: Fence, margin_m: float)
     if fault:
         return fault
     for number, point in enumerate(rally):
-        found = find_route_violation(fence, (point,), margin_m)
+        found = _find_beyond((point,), fence, land, margin_m)
         if found is not None:
             return f"rally[{number}]: {found[1]}"
     return ""
 
 
-def find_home_fault(home: tuple[Waypoint, ...], fence: Fence, margin_m: float) -> str:
+def find_home_fault(home: tuple[Waypoint, ...], fence: Fence, margin_m: float, land: Fence = ()) -> str:
     """Why the boat could not keep its station at home; empty where it can, or where no home is named."""
-    found = find_route_violation(fence, home, margin_m)
+    found = _find_beyond(home, fence, land, margin_m)
     return "" if found is None else f"home: {found[1]}"
 
 
-def find_leg_outside(legs: tuple[MissionLeg, ...], fence: Fence, margin_m: float) -> tuple[int, int, str] | None:
-    """Leg, waypoint and what is wrong with it, of the first outside the fence or nearer than the margin to it."""
+def find_leg_outside(
+    legs: tuple[MissionLeg, ...], fence: Fence, margin_m: float, land: Fence = ()
+) -> tuple[int, int, str] | None:
+    """Leg, waypoint and what is wrong with it, of the first beyond fence or shore, or nearer than the margin to it."""
     for number, leg in enumerate(legs):
-        found = find_route_violation(fence, leg.waypoints, margin_m, repeat=leg.repeat)
+        found = _find_beyond(leg.waypoints, fence, land, margin_m, repeat=leg.repeat)
         if found is not None:
             return number, *found
     return None
@@ -107,16 +109,30 @@ def find_repeated_waypoint(waypoints: tuple[Waypoint, ...], *, repeat: bool) -> 
     return None
 
 
-def _find_size_fault(legs: tuple[MissionLeg, ...], fence: Fence) -> str:
-    waypoints_n, corners_n = sum(len(leg.waypoints) for leg in legs), sum(len(area.corners) for area in fence)
+def _find_beyond(
+    waypoints: tuple[Waypoint, ...], fence: Fence, land: Fence, margin_m: float, *, repeat: bool = False
+) -> tuple[int, str] | None:
+    """The first waypoint that the fence forbids, or its leg to the next; else the first that land does."""
+    found = find_route_violation(fence, waypoints, margin_m, repeat=repeat)
+    if found is None and land:
+        found = find_route_violation(land, waypoints, margin_m, repeat=repeat, words=LAND_WORDS)
+    return found
+
+
+def _count_corners(bounds: Fence) -> int:
+    return sum(len(area.corners) for area in bounds)
+
+
+def _find_size_fault(legs: tuple[MissionLeg, ...], bounds: Fence) -> str:
+    waypoints_n, corners_n = sum(len(leg.waypoints) for leg in legs), _count_corners(bounds)
     if waypoints_n * corners_n > MAX_PAIRS:
         return f"legs: {waypoints_n} waypoints times {corners_n} corners of the fence is more than {MAX_PAIRS}"
     return ""
 
 
-def _find_fence_fault(fence: Fence) -> str:
-    if sum(len(area.corners) for area in fence) > MAX_CORNERS:
-        return f"fence: more than {MAX_CORNERS} corners"
+def _find_fence_fault(fence: Fence, land: Fence) -> str:
+    if _count_corners((*fence, *land)) > MAX_CORNERS:
+        return f"fence: more than {MAX_CORNERS} corners{f', {_count_corners(land)} of them of land' if land else ''}"
     for number, area in enumerate(fence):
         at = f"areas[{number}]"
         fault = _find_point_fault(area.corners, f"{at}.corners")
@@ -162,8 +178,8 @@ def _find_leg_fault(leg: MissionLeg, at: str) -> str:
     return "" if repeated is None else f"{at}.waypoints[{repeated}] and the next are the same"
 
 
-def _find_violation(legs: tuple[MissionLeg, ...], fence: Fence, margin_m: float) -> str:
-    found = find_leg_outside(legs, fence, margin_m)
+def _find_violation(legs: tuple[MissionLeg, ...], fence: Fence, margin_m: float, land: Fence) -> str:
+    found = find_leg_outside(legs, fence, margin_m, land)
     return "" if found is None else f"legs[{found[0]}].waypoints[{found[1]}]: {found[2]}"
 
 

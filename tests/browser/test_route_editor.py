@@ -16,6 +16,7 @@ from paani import messages as m
 from paani.clock import WallClock
 from paani.config import Config
 from paani.fence_geometry import is_allowed
+from paani.geometry import geodetic_from_enu
 from paani.map_origin import map_origin_deg
 from paani_services.navigator.files.geojson import read_geojson_line
 from paani_services.navigator.files.gpx import read_gpx
@@ -23,11 +24,13 @@ from paani_services.navigator.files.map_frame import MapFrame
 from tests.browser.guidance import guiding
 from tests.browser.test_legibility import AXE, SERIOUS, SMALL_TARGETS, SMALL_TEXT
 from tests.browser.test_map_objects import MISSION
-from tests.browser.test_page import MAP_PX_PER_M, WAIT_S, until, watch
+from tests.browser.test_page import MAP_PX_PER_M, WAIT_S, has_colour_on_map, until, watch
 from tests.conftest import OpenAs, Spawn
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
 
+ISLAND = ((6.0, 0.0), (10.0, 0.0), (10.0, 8.0), (6.0, 8.0))
+LAND_RGB = (147, 130, 90)
 HERE = {"x_m": 0.0, "y_m": 0.0, "latitude_deg": 47.65, "longitude_deg": 9.2}
 JUDGE = """async ([fence, points]) => {
   const { isAllowed } = await import("/static/plane_geometry.js");
@@ -146,6 +149,56 @@ async def test_a_point_is_drawn_where_the_hand_went_down_on_what_is_seen(
         await page.evaluate(UNDRAWN, {"height": "80%"})
         await page.mouse.up()
         assert await editor.points() == [(0, 0), (20, 0)]
+
+
+async def test_land_is_drawn_marked_at_its_place_and_refused_when_it_is_sent(
+    browser: Any, open_as: OpenAs, spawn: Spawn, config: Config, tmp_path: Path
+) -> None:
+    """The page and the boat's own processes judge the same file."""
+    places = [geodetic_from_enu(x, y, HERE["latitude_deg"], HERE["longitude_deg"]) for x, y in ISLAND]
+    ring = [[longitude_deg, latitude_deg] for latitude_deg, longitude_deg in (*places, places[0])]
+    land = tmp_path / "land.geojson"
+    land.write_text(json.dumps({"type": "Polygon", "coordinates": [ring]}))
+    origin = f"localization.origin_lat_lon_deg=[{HERE['latitude_deg']}, {HERE['longitude_deg']}]"
+    poses = (await open_as("localization")).publisher(keys.ODOMETRY)
+    pose = replace(m.Odometry(source_us=0, x_m=0.0, y_m=0.0, yaw_rad=0.3, surge_mps=0.0, healthy=True), **HERE)
+
+    async def publish_forever() -> None:
+        while True:
+            now_us = WallClock().now_us()
+            poses.put(replace(pose, source_us=now_us))
+            await asyncio.sleep(0.1)
+
+    async with spawn("operator"), spawn("navigator", f"navigator.land={land}", origin), spawn("dashboard"):
+        publishing = asyncio.create_task(publish_forever())
+        watched = await watch(browser, config)
+        page, editor = watched.page, Editor(watched.page)
+        await until(page, "document.querySelector('#map-pose').textContent.startsWith('0.0 m E, 0.0 m N')")
+        await until(page, "!document.querySelector('#map-land').hidden")
+        assert await page.inner_text("#map-land") == "land"
+        await page.click("#map-edit")
+        await editor.pixel(0, 0)
+        assert await has_colour_on_map(page, LAND_RGB, 6.0, 2.0)
+        await editor.press((-12, 4), (16, 4))
+        await editor.until_note("leg 1, waypoint 1: crosses land")
+        (mark,) = await page.evaluate("paani.marks")
+        assert 5.5 <= mark["at"]["x_m"] <= 6.5, "at the shore"
+        await page.wait_for_timeout(300)
+        await page.screenshot(path=tmp_path / "land.png")
+        await page.click("#editor-send")
+        await editor.until_note("not accepted: legs[0].waypoints[0]: the leg to the next crosses land")
+        await editor.drag((-12, 4), (-12, -3))
+        await editor.drag((16, 4), (16, -1))
+        await editor.until_note("leg 1, waypoint 1: nearer than 1.5 m to land")
+        await page.click("#editor-send")
+        await editor.until_note("the leg to the next comes nearer than 1.5 m to land")
+        await editor.drag((16, -1), (16, -12))
+        await editor.until_note("Nothing is wrong")
+        await page.click("#editor-send")
+        await editor.until_note("Accepted")
+        await until(page, "!document.querySelector('#map-land').hidden")
+        publishing.cancel()
+        assert [line for line in watched.errors if "409" not in line] == []
 
 
 async def test_a_mission_is_drawn_checked_and_sent_as_one(

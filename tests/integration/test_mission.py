@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -109,6 +110,36 @@ async def test_a_route_that_leaves_the_fence_stops_the_process_before_it_starts(
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
     assert "mission.toml: legs[1].waypoints[1]: is outside the fence" in done.stderr
+
+
+async def test_land_of_the_files_outlasts_every_mission_that_is_sent(
+    spawn: Spawn, open_as: OpenAs, tmp_path: Path, private_sets: tuple[str, ...]
+) -> None:
+    land, across, beside = tmp_path / "land.geojson", tmp_path / "across.toml", tmp_path / "beside.toml"
+    ring = [[9.2004, 47.6499], [9.2006, 47.6499], [9.2006, 47.6501], [9.2004, 47.6499]]
+    land.write_text(json.dumps({"type": "Polygon", "coordinates": [ring]}))
+    across.write_text(ROUTE)
+    beside.write_text(ROUTE.replace("x_m = 60\ny_m = 0", "x_m = 0\ny_m = 30").replace('"a"', '"beside"'))
+    send = ("mission", "send", "--no-fence")
+    mission = 'name = "%s"\n[[legs]]\ndo = "follow_route"\nroute = "%s"\n'
+    (tmp_path / "across_mission.toml").write_text(mission % ("across", across.name))
+    (tmp_path / "beside_mission.toml").write_text(mission % ("beside", beside.name))
+    missions = (await open_as("observer")).latest(keys.MISSION)
+    sets = (f"navigator.land={land}", "localization.origin_lat_lon_deg=[47.65, 9.2]")
+    async with spawn("operator"), spawn("navigator", *sets), asyncio.timeout(40):
+        assert [area.name for area in (await missions.next()).land] == ["land"]
+        refused = await paani(private_sets, *send, str(tmp_path / "across_mission.toml"))
+        assert refused == (2, "", "paani: refused: legs[0].waypoints[0]: the leg to the next crosses land\n")
+        assert (await paani(private_sets, *send, str(tmp_path / "beside_mission.toml")))[0] == 0
+        while (taken := await missions.next()).name != "beside":
+            pass
+        assert len(taken.land) == 1
+    land.write_text(json.dumps({"type": "Polygon", "coordinates": [ring[:-1]]}))
+    words = [word for each in (*private_sets, *sets) for word in ("--set", each)]
+    command = [sys.executable, "-m", "paani", "navigator", *words]
+    done = await asyncio.to_thread(subprocess.run, command, capture_output=True, text=True, check=False, timeout=60)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert f"navigator.land {land}: coordinates[0]: is not closed by its first position" in done.stderr
 
 
 async def test_a_mission_that_is_sent_is_followed_a_bad_one_is_not_and_a_restart_forgets_neither(

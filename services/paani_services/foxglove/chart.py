@@ -1,4 +1,4 @@
-"""Route, mission, fence and rally points as GeoJSON, for the viewer's map. Pure."""
+"""Route, mission, fence, land and rally points as GeoJSON, for the viewer's map. Pure."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def chart(route: m.Route | None, mission: m.Mission | None, origin: LatLon) -> b
     if route is not None and len(route.waypoints) > 1:
         features.append(_line(route.waypoints, origin, ROUTE_COLOUR, route.name, closed=route.repeat))
     if mission is not None:
-        for area in mission.fence:
+        for area in mission.bounds:
             name = area.name or f"keep {area.keep}"
             features.append(_line(area.corners, origin, KEEP_COLOURS[area.keep], name, closed=True))
         for number, leg in enumerate(mission.legs, 1):

@@ -101,8 +101,8 @@ def route(followed: m.Route) -> Entity:
 
 
 def mission(planned: m.Mission) -> list[Entity]:
-    """The fence, the stations of the mission with their radius, and rally points."""
-    fence = [_line(area.corners, KEEP[area.keep], FENCE_M, closed=True) for area in planned.fence]
+    """Fence and land, the stations of the mission with their radius, and rally points."""
+    fence = [_line(area.corners, KEEP[area.keep], FENCE_M, closed=True) for area in planned.bounds]
     stations = [
         _cylinder((leg.waypoints[0].x_m, leg.waypoints[0].y_m, ABOVE_WATER_M), 2.0 * leg.radius_m, ABOVE_WATER_M, LEG)
         for leg in planned.legs

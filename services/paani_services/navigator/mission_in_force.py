@@ -7,6 +7,8 @@ import contextlib
 import logging
 from pathlib import Path
 
+import msgspec
+
 from paani import keys
 from paani.bus import Bus, Latest
 from paani.messages import Arming, Mission, OperatorOrder, Route
@@ -22,13 +24,14 @@ class MissionInForce:
     """`route`: the route to show. `mission`: None for a boat that has a route alone, or neither.
 
     A mission of the operator's process is taken when the order names it, and not before: it has been checked, and
-    accepted where it moves nothing.
+    accepted where it moves nothing. Land stays as the files name it.
     """
 
     def __init__(self, bus: Bus, folder: Path, route: Route | None, mission: Mission | None) -> None:
         self.route, self.mission = route, mission
         self.journal = MissionJournal(folder)
         self._ordered = bus.latest(keys.ORDERED_MISSION)
+        self._land = () if mission is None else mission.land
 
     @property
     def accepted_us(self) -> int:
@@ -70,7 +73,7 @@ class MissionInForce:
         if ordered.accepted_us != order.mission_us:
             return False
         LOG.info("another mission: %s, %d legs", ordered.name or "without a name", len(ordered.legs))
-        self.mission, self.route = ordered, next_route(ordered)
+        self.mission, self.route = msgspec.structs.replace(ordered, land=self._land), next_route(ordered)
         self.journal.follow(ordered, MissionProgress())
         return True
 

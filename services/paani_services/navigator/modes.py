@@ -67,7 +67,7 @@ def follow_order(
         return _stand(state, inputs, now_us, domain, config, camera, faults or [Inhibit.IDLE], leg)
     if order is None or order.mode is DriveMode.ROUTE:
         return navigate(state, inputs, mission, now_us, domain, config, camera, planner)
-    fence = mission.fence if mission is not None else ()
+    fence = mission.bounds if mission is not None else ()
     if order.mode is DriveMode.MANUAL:
         return _steer_by_hand(state, inputs, order, fence, now_us, domain, config, camera)
     return _run_errand(state, inputs, order, fence, now_us, domain, config, camera, planner)

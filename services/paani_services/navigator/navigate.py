@@ -140,7 +140,7 @@ def navigate(
     setpoint = compute_leg_setpoint(state.progress, mission, state.ilos, position_m, config)
     if setpoint.inhibit is not None:
         inhibits.append(setpoint.inhibit)
-    if not is_allowed(mission.fence, position_m) and not config.fence_return:
+    if not is_allowed(mission.bounds, position_m) and not config.fence_return:
         inhibits.append(Inhibit.OUTSIDE_FENCE)
     leg = describe_leg(state.progress, mission)
     cross_m = setpoint.cross_track_m
@@ -164,14 +164,14 @@ def navigate(
             heading_rad, speed_mps, TURN_SIDE.get(direction, 0.0), is_pivot_only=_is_turn_to_look(advisory)
         )
         state, heading_rad, speed_mps, is_path_free = _steer_planned(
-            state, odometry, planner_setpoint, now_us, camera, config, mission.fence, planner
+            state, odometry, planner_setpoint, now_us, camera, config, mission.bounds, planner
         )
         if not is_path_free:
             inhibits.append(Inhibit.NO_FREE_PATH)
     if direction not in TURN_DIRECTIONS:
         is_on_course = abs(wrap_rad(heading_rad - setpoint.course_rad)) <= COURSE_TOLERANCE_RAD
         state = _integrate_cross_track(state, setpoint, odometry, now_us, config, is_on_course=is_on_course)
-    bounded_mps = limit_speed(mission.fence, odometry, heading_rad, min(speed_mps, limit_mps), config)
+    bounded_mps = limit_speed(mission.bounds, odometry, heading_rad, min(speed_mps, limit_mps), config)
     if bounded_mps is None:
         inhibits.append(Inhibit.OUTSIDE_FENCE)
     return state, build_command(

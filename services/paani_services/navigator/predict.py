@@ -58,7 +58,7 @@ def predict(
     obstacles = tuple(_on_map(each, boat, odometry) for each in encounters if boat is not None)
     headings: tuple[HeadingVerdict, ...] = ()
     if not has_passed(state.planner_state.planned_us, PLAN_MAX_AGE_US, now_us):
-        fence = mission.fence if mission is not None else ()
+        fence = mission.bounds if mission is not None else ()
         headings = explain_plan(state.planner_state, camera, config.planner, fence)
     return Prediction(
         source_us=odometry.source_us,

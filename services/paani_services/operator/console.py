@@ -228,7 +228,7 @@ class Console:
         self._is_checking = True
         try:
             return await asyncio.to_thread(
-                find_mission_fault, mission.legs, mission.fence, self._margin_m, mission.rally
+                find_mission_fault, mission.legs, mission.fence, self._margin_m, mission.rally, mission.land
             )
         finally:
             self._is_checking = False

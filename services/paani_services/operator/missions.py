@@ -63,6 +63,7 @@ def merge(request: m.MissionRequest, present: m.Mission, now_us: int) -> m.Missi
         fence=present.fence if request.keep_fence else request.fence,
         rally=present.rally if request.keep_rally else request.rally,
         home=present.home,
+        land=present.land,
         accepted_us=accepted_us,
         legs_us=present.legs_us if request.keep_legs else accepted_us,
     )

@@ -13,15 +13,15 @@ CELLS_PER_BYTE = 4
 def choose_place(
     position: m.Waypoint, home: m.Waypoint, mission: m.Mission, occupancy: m.OccupancyGrid | None, margin_m: float
 ) -> m.Waypoint:
-    """The nearest rally point that is nearer than home, inside the fence, and straight ahead within it; else home.
+    """The nearest rally point that is nearer than home, inside the fence, off land, and straight ahead; else home.
 
     A rally point where the boat has seen something is passed over: the way there is a straight line, as the way home.
     """
     home_m = _distance_m(position, home)
     nearer = [point for point in mission.rally if _distance_m(position, point) < home_m]
     for point in sorted(nearer, key=lambda each: _distance_m(position, each)):
-        is_inside = find_route_violation(mission.fence, (point,), margin_m) is None
-        is_straight = is_inside and find_route_violation(mission.fence, (position, point), 0.0) is None
+        is_inside = find_route_violation(mission.bounds, (point,), margin_m) is None
+        is_straight = is_inside and find_route_violation(mission.bounds, (position, point), 0.0) is None
         if is_straight and not is_seen_occupied(point, occupancy):
             return point
     return home

@@ -265,8 +265,8 @@ class RerunDrive:
         )
 
     def _mission(self, mission: m.Mission) -> None:
-        lines = [[(p.x_m, p.y_m, 0.0) for p in (*area.corners, area.corners[0])] for area in mission.fence]
-        colours = [GREEN if area.keep is m.Keep.IN else RED for area in mission.fence]
+        lines = [[(p.x_m, p.y_m, 0.0) for p in (*area.corners, area.corners[0])] for area in mission.bounds]
+        colours = [GREEN if area.keep is m.Keep.IN else RED for area in mission.bounds]
         fence = rr.LineStrips3D(lines, radii=LINE_M, colors=colours)
         self._transient(FENCE, fence, mission.sent_us, keys.MISSION.fresh_s)
         self._transient(RALLY, _places(mission.rally, "rally"), mission.sent_us, keys.MISSION.fresh_s)

@@ -14,12 +14,13 @@ from msgspec.structs import replace
 
 from paani.config import load_config
 from paani.errors import UserError
-from paani.fence_geometry import find_route_violation
+from paani.fence_geometry import FENCE_WORDS, LAND_WORDS, BorderWords, find_route_violation
 from paani.geometry import geodetic_from_enu
 from paani.messages import FenceArea
 from paani.option_paths import input_file, output_file
 from paani.whole_file import write_whole
 from paani_services.navigator.files.fence_file import load_fence
+from paani_services.navigator.files.land_file import load_land
 from paani_services.navigator.files.line_simplification import simplify_line
 from paani_services.navigator.files.map_frame import LatLon
 from paani_services.navigator.files.route_file import (
@@ -92,19 +93,21 @@ def _check(options: argparse.Namespace) -> None:
     line = read_route(options.source, where)
     map_origin_deg = in_own_metres(line, where).origin_deg
     route = load_route(options.source, map_origin_deg, "")
-    fences = [] if options.fence is None else [(str(options.fence), load_fence(options.fence, map_origin_deg, ""))]
+    fences: list[tuple[str, tuple[FenceArea, ...], BorderWords]] = []
+    if options.fence is not None:
+        fences.append((str(options.fence), load_fence(options.fence, map_origin_deg, ""), FENCE_WORDS))
     if options.world is not None:
-        fences.append((f"world {options.world}", _world_fence(options.world, map_origin_deg)))
+        fences.append((f"world {options.world}", _world_fence(options.world, map_origin_deg), FENCE_WORDS))
+    if options.land is not None:
+        fences.append((str(options.land), load_land(options.land, map_origin_deg, ""), LAND_WORDS))
     margin_m = load_config().navigator.fence_margin_m
-    for name, fence in fences:
-        found = find_route_violation(fence, route.waypoints, margin_m, repeat=route.repeat)
+    for name, fence, words in fences:
+        found = find_route_violation(fence, route.waypoints, margin_m, repeat=route.repeat, words=words)
         if found is not None:
             raise UserError(f"{where}: waypoints[{found[0]}]: {found[1]} ({name})")
-    sys.stdout.write(f"{where}: {len(route.waypoints)} waypoints, good{_inside_text(fences)}\n")
-
-
-def _inside_text(fences: list[tuple[str, tuple[FenceArea, ...]]]) -> str:
-    return f", inside {' and '.join(name for name, _ in fences)}" if fences else ""
+    within = [f"{'off' if words is LAND_WORDS else 'inside'} {name}" for name, _, words in fences]
+    good = ", ".join(("good", *([" and ".join(within)] if within else [])))
+    sys.stdout.write(f"{where}: {len(route.waypoints)} waypoints, {good}\n")
 
 
 def _world_fence(world: str, map_origin_deg: LatLon | None) -> tuple[FenceArea, ...]:
@@ -152,5 +155,6 @@ def _parser() -> argparse.ArgumentParser:
     check = commands.add_parser("check", help="check that the navigator can follow a route")
     check.add_argument("source", type=input_file(), metavar="FILE")
     check.add_argument("--fence", type=input_file("--fence"), metavar="FILE", help="fence that the route may not leave")
+    check.add_argument("--land", type=input_file("--land"), metavar="FILE", help="land that the route may not cross")
     check.add_argument("--world", metavar="NAME", help="world whose water the route may not leave")
     return parser

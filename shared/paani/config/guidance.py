@@ -40,13 +40,14 @@ class LocalizationConfig(Section, frozen=True):
 class NavigatorConfig(Section, frozen=True):
     """Guidance along a mission, and the ages of inputs beyond which the boat may not move.
 
-    `route`, `mission` and `fence` are paths of files; the formats are in the navigator's README. With neither `route`
-    nor `mission` the boat does not move. Without `mission` the `route` alone is followed.
+    `route`, `mission`, `fence` and `land` are paths of files; the formats are in the navigator's README. With neither
+    `route` nor `mission` the boat does not move. Without `mission` the `route` alone is followed.
     """
 
     route: str = ""
     mission: str = ""
     fence: str = ""
+    land: str = ""  # kept out of as an area of the fence, and by no client taken away
     rate_hz: Positive = 10.0  # orders a second at least; changes of advice or inhibits go out at once
     acceptance_m: Positive = 1.5  # a waypoint counts as reached within it; M2: 1.0
     pass_abeam_m: NonNegative = 6.0  # a waypoint left behind within this distance counts; 0: never

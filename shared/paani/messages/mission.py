@@ -53,9 +53,10 @@ class FenceArea(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Mission(Message, frozen=True, kw_only=True):
-    """The legs in order, the fence, and where home is.
+    """The legs in order, the fence, the land, and where home is.
 
     The boat stays inside at least one of the areas that keep in, if there are any, and outside all that keep out.
+    `land`: of the boat's files, kept out of likewise; no client changes it.
     `rally`: places that RETURN may lead to where they are nearer than home. Without legs there is nothing to do.
     `home`: the one place that the boat's files name; empty: where the boat was first free to move.
     `accepted_us`: when the operator's process accepted it, which is its name among the missions of a run; 0: of the
@@ -70,6 +71,12 @@ class Mission(Message, frozen=True, kw_only=True):
     accepted_us: Stamp = 0
     legs_us: Stamp = 0
     home: tuple[Waypoint, ...] = ()
+    land: tuple[FenceArea, ...] = ()
+
+    @property
+    def bounds(self) -> tuple[FenceArea, ...]:
+        """Fence and land: everything that the boat is kept in and out of."""
+        return (*self.fence, *self.land)
 
 
 class MissionRequest(Message, frozen=True, kw_only=True):

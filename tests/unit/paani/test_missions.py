@@ -30,6 +30,10 @@ def changed(leg: MissionLeg, **fields: Any) -> MissionLeg:
     return msgspec.structs.replace(leg, **fields)
 
 
+def changed_corners(area: FenceArea, *places: tuple[float, float]) -> FenceArea:
+    return msgspec.structs.replace(area, corners=points(*places))
+
+
 def line(count: int) -> tuple[Waypoint, ...]:
     return points(*((float(number), 0.0) for number in range(count)))
 
@@ -87,6 +91,23 @@ def test_a_fault_of_a_leg_is_named(legs: tuple[MissionLeg, ...], fault: str) -> 
 )
 def test_a_fault_of_a_fence_is_named(fence: tuple[FenceArea, ...], fault: str) -> None:
     assert find_mission_fault(LEGS, fence, MARGIN_M).startswith(fault)
+
+
+def test_land_is_judged_as_an_area_that_keeps_out_and_named() -> None:
+    island = changed_corners(REEDS, (30, -3), (34, -3), (34, 3), (30, 3))
+    assert find_mission_fault(LEGS, (BASIN,), MARGIN_M, land=(island,)) == ""
+    across = changed(ROUTE, waypoints=points((0, 0), (20, 0), (38, 0)))
+    for legs, rally, fault in (
+        ((across,), (), "legs[0].waypoints[1]: the leg to the next crosses land"),
+        ((changed(STATION, waypoints=points((31, 0))),), (), "legs[0].waypoints[0]: is on land"),
+        ((), points((0, 0), (29.5, 0)), "rally[1]: is nearer than 1.0 m to land"),
+    ):
+        assert find_mission_fault(legs, (BASIN,), MARGIN_M, rally, (island,)) == fault
+        assert find_mission_fault(legs, (BASIN,), MARGIN_M, rally) == ""
+    shore = changed_corners(REEDS, *((60 + math.cos(n / 160), math.sin(n / 160)) for n in range(997)))
+    assert find_mission_fault(LEGS, (BASIN, REEDS), MARGIN_M, land=(shore,)) == (
+        "fence: more than 1000 corners, 997 of them of land"
+    )
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ export const PAGE_TEXTS = {
   top_edge_title: "Upper edge of the corridors", own_hull_title: "What the own hull covers of the picture", camera_canvas: "Newest picture with overlay", tracks: "Tracks",
   motion: "Motion", explanation: "Explanation", map: "Map", headings_title: "Why this heading and no other", mission_editor: "Mission editor", legs_and_areas: "Legs and areas",
   gpx_or_geojson_file: "GPX or GeoJSON file", headings_group: "Headings that the planner weighed",
-  map_canvas: "Fence, mission, route, way ahead, moving obstacles, estimated and true track, in metres east and north", map_controls: "Which way is up, and how large",
+  map_canvas: "Fence, land, mission, route, way ahead, moving obstacles, estimated and true track, in metres east and north", map_controls: "Which way is up, and how large",
   zoom_in: "Zoom in", zoom_out: "Zoom out", log: "Log", health: "Health", recordings: "Recordings", topics: "Topics", settings: "Settings",
   sensors_and_bridge: "Sensors and bridge", plots_group: "Plots of the last ten minutes", time: "Time", playback: "Playback", step_back: "Step back",
   step_back_key: "Step back (,)", play: "Play", play_or_pause_k: "Play or pause (K)", step_forward: "Step forward", step_forward_key: "Step forward (.)", speed: "Speed",
@@ -19,7 +19,7 @@ export const PAGE_TEXTS = {
   override: "Override the advice for 10 s", mask: "Mask", boxes: "Boxes", corridors: "Corridors", top_edge: "Top edge", own_hull: "Own hull", opacity: "Opacity", water: "water",
   obstacle: "obstacle", sky: "sky", accepted: "accepted", not_seen_now: "not seen now", immediate_danger: "immediate danger", edit: "Edit", follow: "Follow", route: "Route",
   headings: "Headings", repeat: "repeat", laps: "laps", radius: "radius", metres: "m", for: "for", seconds: "s", speed_field: "speed", send: "Send", taken: "Taken", up: "Up:",
-  north: "North", route_line: "route", fence: "fence", way_ahead: "way ahead", moving: "moving", estimated_track: "estimated track", true_track: "true track", plots: "Plots",
+  north: "North", route_line: "route", fence: "fence", land: "land", way_ahead: "way ahead", moving: "moving", estimated_track: "estimated track", true_track: "true track", plots: "Plots",
   mode: "Mode", alerts_row: "Alerts", latency: "Latency", the_operator_key_which: "The operator's key, which", paani_up: "paani up", prints: "prints", log_in: "Log in",
   stops_the_boat_at_once: "Stops the boat at once, without login.",
 };
@@ -135,7 +135,7 @@ export const SENSOR_TEXTS = {
 /** Faults of a mission that is drawn, and of a file with one. */
 export const FAULT_TEXTS = {
   fewCorners: "needs 3 corners", sameCorners: "two corners are the same", crossing: "its edges cross", smallArea: "hardly any area", fewWaypoints: "a route needs 2 waypoints",
-  waypoint: "waypoint", sameWaypoint: "the next is the same", outside: "leaves the fence", occupied: "the boat has seen something there",
+  waypoint: "waypoint", sameWaypoint: "the next is the same", outside: "leaves the fence", land: "crosses land", occupied: "the boat has seen something there",
   area: (/** @type {boolean} */ isIn, /** @type {number} */ number) => `${isIn ? "keep-in" : "keep-out"} area ${number}`,
   leg: (/** @type {number} */ number) => `leg ${number}`,
   tooManyWaypoints: (/** @type {number} */ most) => `more than ${most} waypoints`,
@@ -145,7 +145,7 @@ export const FAULT_TEXTS = {
   tooManyRallyPairs: (/** @type {number} */ points, /** @type {number} */ corners, /** @type {number} */ most) => `${points} rally points times ${corners} corners is more than ${most}`,
   tooManyLegs: (/** @type {number} */ most) => `more than ${most} legs`,
   endless: (/** @type {number} */ number) => `leg ${number} has no end, so no leg may come after it`,
-  near: (/** @type {number} */ marginM) => `nearer than ${marginM} m to the fence`,
+  near: (/** @type {number} */ marginM) => `nearer than ${marginM} m to the fence`, nearLand: (/** @type {number} */ marginM) => `nearer than ${marginM} m to land`,
   tight: (/** @type {number} */ radiusM) => `a turn too tight for the hull, ${radiusM} m`,
 };
 export const FILE_TEXTS = {
@@ -187,7 +187,7 @@ export const STOP_REASONS = {
   ROUTE_FINISHED: "route finished",
   HOLDING: "holding station",
   MISSION_DONE: "mission done",
-  OUTSIDE_FENCE: "outside the fence, or too close to it",
+  OUTSIDE_FENCE: "outside the fence or on land, or too close to its edge",
   NO_ORDER: "no mode received from the operator's process",
   STALE_ORDER: "the operator's order is too old",
   IDLE: "idle: no mode that moves the boat is chosen",

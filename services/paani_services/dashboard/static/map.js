@@ -1,12 +1,12 @@
 // @ts-check
-// The map panel in local metres: fence, mission, route, way ahead, moving obstacles, estimated and true track.
+// The map panel in local metres: fence, land, mission, route, way ahead, moving obstacles, estimated and true track.
 
 import { drawBoat, drawRoute, drawTrack } from "./map_boat.js";
 import { MapControls } from "./map_controls.js";
 import { drawGrid, drawScale } from "./map_ground.js";
 import { MapHeadings } from "./map_headings.js";
 import { MapLabels } from "./map_labels.js";
-import { drawFence, drawGhost, drawHome, drawObstacles, drawPath, drawRally, drawStations } from "./map_objects.js";
+import { drawFence, drawGhost, drawHome, drawLand, drawObstacles, drawPath, drawRally, drawStations } from "./map_objects.js";
 import { MapTiles } from "./map_tiles.js";
 import { MapProjection, NORTH_RAD, placeAhead } from "./map_projection.js";
 import { isReplay } from "./inhibits.js";
@@ -111,6 +111,8 @@ export class MapPanel {
 
   /** What the boat was told. @param {import("./map_objects.js").Chart} chart @param {import("./store.js").Store} store @param {any} mission @param {any} route */
   drawGiven(chart, store, mission, route) {
+    byId("map-land").hidden = !mission?.land?.length;
+    if (mission) drawLand(chart, mission);
     if (mission) drawFence(chart, mission);
     if (mission) drawStations(chart, mission);
     if (mission) drawRally(chart, mission);

@@ -1,5 +1,5 @@
 // @ts-check
-// Draws on the map what the boat is told and what it sees coming: fence, stations, rally points, home, the way ahead, moving obstacles.
+// Draws on the map what the boat is told and what it sees coming: fence, land, stations, rally points, home, the way ahead, moving obstacles.
 
 import { MAP_TEXTS, ageText, trackNames } from "./text.js";
 
@@ -8,6 +8,21 @@ const GHOST_S = 30; // no boat that nobody hears is said to go straight on for l
 
 /** Metres east and north to pixels. @typedef {(x: number, y: number) => [number, number]} ToScreen */
 /** turnRad: by which every direction is turned, counter-clockwise. @typedef {{ctx: CanvasRenderingContext2D, toScreen: ToScreen, turnRad: number, pxPerM: number, colour: (name: string) => string, labels: import("./map_labels.js").MapLabels}} Chart */
+
+/** Land, filled: it lies under everything else that is drawn. @param {Chart} chart @param {any} mission */
+export function drawLand({ ctx, toScreen, colour }, mission) {
+  ctx.fillStyle = ctx.strokeStyle = colour("--land");
+  ctx.lineWidth = 2;
+  for (const area of mission.land ?? []) {
+    ctx.beginPath();
+    for (const corner of area.corners) ctx.lineTo(...toScreen(corner.x_m, corner.y_m));
+    ctx.closePath();
+    ctx.globalAlpha = 0.35;
+    ctx.fill();
+    ctx.globalAlpha = 1;
+    ctx.stroke();
+  }
+}
 
 /** Areas to keep in are outlined, areas to keep out are hatched too. @param {Chart} chart @param {any} mission */
 export function drawFence({ ctx, toScreen, colour }, mission) {

@@ -4,7 +4,7 @@
 // a turn too tight for the hull, and cells in which the boat has seen something. Pure.
 
 import { FAULT_TEXTS } from "./text.js";
-import { between, clearance, crossing, distance, isAllowed, segments } from "./plane_geometry.js";
+import { between, clearance, contains, crossing, distance, isAllowed, segments } from "./plane_geometry.js";
 
 const STEP_M = 0.5, MAX_STEPS = 400; // along a segment
 const MAX_TESTS = 2e6; // of a place against an edge: of a large mission fewer places are tried, so that the page answers
@@ -16,13 +16,14 @@ const OCCUPIED = 2; // as `Occupancy` in messages/occupancy.py
  * @typedef {{kind: string, waypoints: Point[], repeat: boolean, laps: number, radius_m: number, duration_s: number, speed_mps: number}} Leg
  * `rally`: at most one, whose waypoints are the rally points.
  * @typedef {{legs: Leg[], fence: import("./plane_geometry.js").Area[], rally: Leg[]}} Plan
- * @typedef {{marginM: number, turnRadiusM: number}} Limits
+ * `land`: what the boat's files name so; no client changes it.
+ * @typedef {{marginM: number, turnRadiusM: number, land?: import("./plane_geometry.js").Area[]}} Limits
  * @typedef {{at: Point | null, text: string}} Mark
  */
 
 /** @param {Plan} plan @param {Limits} limits @param {any} [grid] the navigator's `OccupancyGrid` @returns {Mark[]} */
 export function findMarks(plan, limits, grid) {
-  const cells = grid ? unpack(grid) : null, counts = countMarks(plan);
+  const cells = grid ? unpack(grid) : null, counts = countMarks(plan, limits);
   if (counts.some(({ isTooMuch }) => isTooMuch)) return counts;
   return [
     ...counts,
@@ -32,16 +33,16 @@ export function findMarks(plan, limits, grid) {
   ];
 }
 
-/** @param {Plan} plan */
-const sizeOf = ({ legs, fence, rally }) => ({
+/** @param {Plan} plan @param {Limits} limits */
+const sizeOf = ({ legs, fence, rally }, { land = [] }) => ({
   rally: rally.reduce((all, leg) => all + leg.waypoints.length, 0),
   waypoints: legs.reduce((all, leg) => all + leg.waypoints.length, 0),
-  corners: fence.reduce((all, area) => all + area.corners.length, 0),
+  corners: [...fence, ...land].reduce((all, area) => all + area.corners.length, 0),
 });
 
-/** Faults of numbers; with one that is too much nothing else is looked at. @param {Plan} plan @returns {(Mark & {isTooMuch: boolean})[]} */
-function countMarks(plan) {
-  const { legs } = plan, { waypoints, corners, rally } = sizeOf(plan);
+/** Faults of numbers; with one that is too much nothing else is looked at. @param {Plan} plan @param {Limits} limits @returns {(Mark & {isTooMuch: boolean})[]} */
+function countMarks(plan, limits) {
+  const { legs } = plan, { waypoints, corners, rally } = sizeOf(plan, limits);
   const endless = legs.findIndex((leg) => leg.kind === "follow_route" && leg.laps === 0), found = [];
   if (waypoints > MAX_WAYPOINTS) found.push(FAULT_TEXTS.tooManyWaypoints(MAX_WAYPOINTS));
   if (corners > MAX_CORNERS) found.push(FAULT_TEXTS.tooManyCorners(MAX_CORNERS));
@@ -75,7 +76,7 @@ function legMarks(leg, name, plan, limits, cells) {
   const { waypoints } = leg;
   if (leg.kind === "follow_route" && waypoints.length < 2) return [{ at: waypoints[0] ?? null, text: `${name}: ${FAULT_TEXTS.fewWaypoints}` }];
   /** @type {Mark[]} */
-  const found = [], { waypoints: all, corners } = sizeOf(plan), most = Math.min(MAX_STEPS, Math.ceil(MAX_TESTS / (2 * Math.max(1, all) * Math.max(1, corners))));
+  const found = [], { land = [] } = limits, { waypoints: all, corners } = sizeOf(plan, limits), most = Math.min(MAX_STEPS, Math.ceil(MAX_TESTS / (2 * Math.max(1, all) * Math.max(1, corners))));
   const isLine = waypoints.length > 1 && leg.kind !== "rally";
   const ways = isLine ? segments(waypoints, leg.repeat) : waypoints.map((at) => /** @type {[Point, Point]} */ ([at, at]));
   ways.forEach(([a, b], index) => {
@@ -85,6 +86,10 @@ function legMarks(leg, name, plan, limits, cells) {
     if (outside) found.push({ at: outside, text: `${where}: ${FAULT_TEXTS.outside}` });
     const near = outside ? null : firstAlong(a, b, most, (at) => clearance(plan.fence, at) < limits.marginM);
     if (near) found.push({ at: near, text: `${where}: ${FAULT_TEXTS.near(limits.marginM)}` });
+    const onLand = firstAlong(a, b, most, (at) => land.some((area) => contains(area, at)));
+    if (onLand) found.push({ at: onLand, text: `${where}: ${FAULT_TEXTS.land}` });
+    const nearLand = onLand ? null : firstAlong(a, b, most, (at) => clearance(land, at) < limits.marginM);
+    if (nearLand) found.push({ at: nearLand, text: `${where}: ${FAULT_TEXTS.nearLand(limits.marginM)}` });
     const seen = cells && firstAlong(a, b, most, (at) => isOccupied(cells, at));
     if (seen) found.push({ at: seen, text: `${where}: ${FAULT_TEXTS.occupied}` });
   });

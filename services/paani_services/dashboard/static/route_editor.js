@@ -25,6 +25,8 @@ export class RouteEditor {
     this.marks = [];
     this.checked = "";
     this.checkAgainAt = 0;
+    /** What the navigator says of land, and that as text. @type {[any, string]} */
+    this.land = [undefined, ""];
     this.note = "";
     /** @type {import("./store.js").Store | null} */
     this.store = null;
@@ -179,11 +181,13 @@ export class RouteEditor {
     this.store = store;
     if (!this.isOpen) return;
     const { made } = this, settings = store.get("dashboard/settings"), grid = store.isFresh("navigator/occupancy", now) ? store.get("navigator/occupancy") : undefined;
-    const state = JSON.stringify(made.plan) + (grid?.source_us ?? "");
+    const mission = store.get("navigator/mission"), land = mission?.land ?? [];
+    if (mission !== this.land[0]) this.land = [mission, JSON.stringify(land)];
+    const state = JSON.stringify(made.plan) + this.land[1] + (grid?.source_us ?? "");
     const began = performance.now();
     if (state !== this.checked && settings && began >= this.checkAgainAt) {
       this.checked = state;
-      this.marks = findMarks(made.plan, { marginM: settings.fence_margin_m, turnRadiusM: settings.turn_radius_m }, grid);
+      this.marks = findMarks(made.plan, { marginM: settings.fence_margin_m, turnRadiusM: settings.turn_radius_m, land }, grid);
       this.checkAgainAt = began + (performance.now() - began) / MAX_SHARE;
     }
     this.renderItems();

@@ -28,7 +28,7 @@ function describeStages(store) {
     operator: [operator?.armed ? `${STAGE_TEXTS.armedBy} ${operatorText(operator.by)}` : "", false],
     mission: [command?.leg ? `${name}${command.leg}${command.leg.startsWith("follow route") ? waypoint : ""}` : "", false],
     planner: describePlanner(store, command),
-    fence: [describeFence(mission?.fence ?? []), false],
+    fence: [describeFence([...(mission?.fence ?? []), ...(mission?.land ?? [])]), false],
     controller: [thrust?.enabled ? STAGE_TEXTS.errors(fixed(thrust.speed_error_mps), fixed((thrust.heading_error_rad * 180) / Math.PI, 0)) : "", false],
     gate: [applied ? STAGE_TEXTS.thrust(fixed(applied.left_n, 1), fixed(applied.right_n, 1)) : "", false],
   };

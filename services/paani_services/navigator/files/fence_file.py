@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import msgspec
 
@@ -22,6 +22,9 @@ from paani_services.navigator.files.geojson import (
 )
 from paani_services.navigator.files.map_frame import FilePoint, LatLon, MapFrame, Origin
 from paani_services.navigator.files.route_line import clean_name
+
+AreaRow = tuple[Keep, tuple[FilePoint, ...], str, str]  # keep, corners, name, place in the file
+Rings = tuple[tuple[Position, ...], ...]  # the outer one first, then holes
 
 
 class _FenceFileArea(Section, frozen=True):
@@ -54,7 +57,12 @@ def load_fence(path: Path, map_origin_deg: LatLon | None, where: str = "navigato
             raise UserError(f"{where}: not a fence file (have: .toml, .geojson, .json)")
     if not rows:
         raise UserError(f"{where}: has no Polygon")
-    frame = MapFrame(where, origin_deg, map_origin_deg)
+    return build_areas(rows, MapFrame(where, origin_deg, map_origin_deg))
+
+
+def build_areas(rows: list[AreaRow], frame: MapFrame) -> tuple[FenceArea, ...]:
+    """The areas on the map. Raises UserError that names area and corner."""
+    where = frame.where
     areas = tuple(
         FenceArea(
             keep=keep,
@@ -72,8 +80,8 @@ def load_fence(path: Path, map_origin_deg: LatLon | None, where: str = "navigato
     return areas
 
 
-def _areas_of_geometry(geometry: Geometry, at: str) -> list[tuple[Keep, tuple[FilePoint, ...], str, str]]:
-    """Areas of one geometry: keep, points, name and place in the file. The outer ring keeps as it says; holes, out."""
+def _areas_of_geometry(geometry: Geometry, at: str) -> list[AreaRow]:
+    """Areas of one geometry. The outer ring keeps as it says; holes, out."""
     if geometry.type == "MultiPolygon":
         raise UserError(f"{geometry.where}: MultiPolygon: give each Polygon a Feature of its own")
     if geometry.type != "Polygon":
@@ -82,23 +90,28 @@ def _areas_of_geometry(geometry: Geometry, at: str) -> list[tuple[Keep, tuple[Fi
         keep = msgspec.convert(geometry.properties.get("keep"), Keep)
     except UNDECODABLE as error:
         raise UserError(f'{geometry.where}: properties.keep of a Polygon is "in" or "out"') from error
-    rings = decode_coordinates(geometry, tuple[tuple[Position, ...], ...])
+    rings = decode_coordinates(geometry, Rings)
     if not rings or (keep is Keep.OUT and len(rings) > 1):
         raise UserError(
             f"{geometry.where}: coordinates: only an area that keeps in may have holes, and each has a ring"
         )
-    name = clean_name(str(_text_or_empty(geometry.properties.get("name"))))
+    name = name_of(geometry)
     found = []
     for number, ring in enumerate(rings):
-        at_ring = f"{at}.coordinates[{number}]"
-        points = tuple(
-            point_of_position(position, f"{geometry.where}: {at_ring}[{n}]") for n, position in enumerate(ring)
-        )
-        if len(points) < 4 or points[0] != points[-1]:
-            raise UserError(f"{geometry.where}: coordinates[{number}]: is not closed by its first position")
-        found.append((keep if number == 0 else Keep.OUT, points[:-1], name, at_ring))
+        points = points_of_ring(geometry, ring, f"coordinates[{number}]")
+        found.append((keep if number == 0 else Keep.OUT, points, name, f"{at}.coordinates[{number}]"))
     return found
 
 
-def _text_or_empty(value: Any) -> str:
-    return value if isinstance(value, str) else ""
+def points_of_ring(geometry: Geometry, ring: tuple[Position, ...], at: str) -> tuple[FilePoint, ...]:
+    """The corners of a ring, the last of which is not its first again. Raises UserError."""
+    points = tuple(point_of_position(position, f"{geometry.where}: {at}[{n}]") for n, position in enumerate(ring))
+    if len(points) < 4 or points[0] != points[-1]:
+        raise UserError(f"{geometry.where}: {at}: is not closed by its first position")
+    return points[:-1]
+
+
+def name_of(geometry: Geometry) -> str:
+    """The name that the properties give it; empty: none."""
+    value = geometry.properties.get("name")
+    return clean_name(value) if isinstance(value, str) else ""

@@ -10,8 +10,9 @@ import msgspec
 from paani.config import NavigatorConfig
 from paani.config.section import Positive, Section
 from paani.errors import UserError
-from paani.messages import LegKind, Mission, MissionLeg, Route, Waypoint
+from paani.messages import FenceArea, LegKind, Mission, MissionLeg, Route, Waypoint
 from paani.missions import (
+    MAX_CORNERS,
     MAX_LAPS,
     MAX_LEGS,
     MAX_RADIUS_M,
@@ -25,6 +26,7 @@ from paani.missions import (
 )
 from paani_services.navigator.files.bounded_reading import read_toml
 from paani_services.navigator.files.fence_file import load_fence
+from paani_services.navigator.files.land_file import load_land
 from paani_services.navigator.files.map_frame import FilePoint, LatLon, MapFrame, Origin
 from paani_services.navigator.files.route_file import load_route
 
@@ -80,32 +82,42 @@ class _MissionFile(Section, frozen=True):
 def load_route_and_mission(
     config: NavigatorConfig, map_origin_deg: LatLon | None
 ) -> tuple[Route | None, Mission | None]:
-    """The route to begin with, and the mission if the settings name one or a fence.
+    """The route to begin with, and the mission if the settings name one, a fence or land.
 
     `map_origin_deg`: the map's origin, latitude and longitude [deg]. Raises UserError that names file and field,
-    also for a route that leaves the fence.
+    also for a route that leaves the fence or crosses land.
     """
     route = load_route(Path(config.route), map_origin_deg) if config.route else None
-    if not config.mission and not config.fence:
+    land = load_land(Path(config.land), map_origin_deg) if config.land else ()
+    if not config.mission and not config.fence and not land:
         return route, None
     if config.mission:
         where = f"navigator.mission {config.mission}"
         mission = load_mission(Path(config.mission), map_origin_deg, route)
     else:
         where = f"navigator.route {config.route}"
-        if route is None:
+        if route is None and config.fence:
             raise UserError(f"navigator.fence {config.fence}: needs navigator.route or navigator.mission")
-        mission = mission_of_route(route)
-    if config.fence:
-        mission = msgspec.structs.replace(mission, fence=load_fence(Path(config.fence), map_origin_deg))
-        found = find_leg_outside(mission.legs, mission.fence, config.fence_margin_m)
-        if found is not None:
-            leg, waypoint, what = found
-            raise UserError(f"{where}: {f'legs[{leg}].' if config.mission else ''}waypoints[{waypoint}]: {what}")
-        fault = find_home_fault(mission.home, mission.fence, config.fence_margin_m)
-        if fault := fault or find_rally_fault(mission.rally, mission.fence, config.fence_margin_m):
-            raise UserError(f"{where}: {fault}")
-    return next_route(mission) or route, mission
+        mission = Mission(source_us=0, name="", legs=()) if route is None else mission_of_route(route)
+    fence = load_fence(Path(config.fence), map_origin_deg) if config.fence else ()
+    _require_within(mission, fence, land, config, where)
+    return next_route(mission) or route, msgspec.structs.replace(mission, fence=fence, land=land)
+
+
+def _require_within(
+    mission: Mission, fence: tuple[FenceArea, ...], land: tuple[FenceArea, ...], config: NavigatorConfig, where: str
+) -> None:
+    """Raises UserError for a waypoint, home or rally point that fence or land forbid, and for too many corners."""
+    if sum(len(area.corners) for area in (*fence, *land)) > MAX_CORNERS:
+        raise UserError(f"navigator.fence {config.fence}: more than {MAX_CORNERS} corners with those of navigator.land")
+    margin_m = config.fence_margin_m
+    found = find_leg_outside(mission.legs, fence, margin_m, land)
+    if found is not None:
+        leg, waypoint, what = found
+        raise UserError(f"{where}: {f'legs[{leg}].' if config.mission else ''}waypoints[{waypoint}]: {what}")
+    fault = find_home_fault(mission.home, fence, margin_m, land)
+    if fault := fault or find_rally_fault(mission.rally, fence, margin_m, land):
+        raise UserError(f"{where}: {fault}")
 
 
 def load_mission(

@@ -24,6 +24,7 @@ def test_there_is_one_example_of_each_format() -> None:
         ("toml", "mission"),
         ("toml", "fence"),
         ("geojson", "fence"),
+        ("geojson", "land"),
     ]
 
 
@@ -33,9 +34,14 @@ def test_the_examples_load_together(tmp_path: Path, fence: int) -> None:
     (tmp_path / "survey.toml").write_text(EXAMPLES[1][2])
     file = tmp_path / f"fence.{EXAMPLES[fence][0]}"
     file.write_text(EXAMPLES[fence][2])
-    config = msgspec.structs.replace(load_config().navigator, mission=str(tmp_path / "survey.toml"), fence=str(file))
+    land = tmp_path / "shores.geojson"
+    land.write_text(EXAMPLES[4][2])
+    config = msgspec.structs.replace(
+        load_config().navigator, mission=str(tmp_path / "survey.toml"), fence=str(file), land=str(land)
+    )
     route, mission = load_route_and_mission(config, ORIGIN)
     assert route is not None
     assert mission is not None
     assert len(mission.legs) == 4
     assert mission.fence == load_fence(file, ORIGIN)
+    assert [area.name for area in mission.land] == ["north shore"]

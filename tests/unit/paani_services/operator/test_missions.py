@@ -64,6 +64,7 @@ def test_what_is_kept_stays_and_legs_that_stay_keep_their_stamp() -> None:
     fence = missions.merge(replace(SENT, fence=NARROW, keep_legs=True), both, 60)
     assert (fence.name, fence.legs, fence.fence, fence.accepted_us, fence.legs_us) == ("sent", OTHER, NARROW, 60, 50)
     assert missions.merge(SENT, replace(FILES, home=points((3, 0))), 50).home == points((3, 0))
+    assert missions.merge(SENT, replace(FILES, land=NARROW), 50).land == NARROW, "no client takes land away"
     legs = missions.merge(replace(SENT, fence=NARROW, keep_fence=True), both, 40)
     assert (legs.fence, legs.accepted_us) == (FENCE, 51), "a clock that was set back names no two missions alike"
 
@@ -114,6 +115,14 @@ async def test_a_mission_that_leaves_its_fence_is_refused_and_the_one_before_sta
     state = await desk.send(replace(SENT, press=10, fence=NARROW, keep_legs=True))
     assert state.mission_fault.endswith("is outside the fence"), "the legs of the files within another fence"
     assert (state.mission_us, desk.missions.messages) == (0, [])
+
+
+async def test_a_mission_across_land_is_refused_whatever_fence_comes_with_it(tmp_path: Path) -> None:
+    desk = MissionDesk(tmp_path)
+    island = replace(NARROW[0], keep=m.Keep.OUT, corners=points((4, -2), (6, -2), (5, 2)))
+    desk.console._read_facts = lambda: Facts(mission=replace(FILES, land=(island,)))
+    state = await desk.send(replace(SENT, legs=LEGS, fence=()))
+    assert state.mission_fault == "legs[0].waypoints[0]: the leg to the next crosses land"
 
 
 async def test_a_rally_point_outside_the_fence_or_on_what_was_seen_is_refused_and_those_before_stay(

@@ -49,6 +49,12 @@ def test_a_boat_that_is_itself_outside_the_fence_is_led_home() -> None:
     assert chosen(NEAR, fence=(replace(BASIN, corners=points((5, -60), (60, -60), (60, 60), (5, 60))),)) == HOME
 
 
+def test_land_is_passed_over_as_a_fence_is() -> None:
+    mission = m.Mission(source_us=1, name="", legs=(), land=(WALL,), rally=(NEAR,))
+    assert choose_place(HERE, HOME, mission, None, MARGIN_M) == HOME
+    assert choose_place(HERE, HOME, replace(mission, land=()), None, MARGIN_M) == NEAR
+
+
 @pytest.mark.parametrize(
     ("seen", "place"), [(None, NEAR), (NONE_SEEN, NEAR), (ROCK, HOME), (replace(ROCK, cells=b""), HOME),
                         (replace(ROCK, west_m=100.0), NEAR), (replace(ROCK, cells=b"\x40"), NEAR)]

@@ -161,6 +161,16 @@ def test_the_boat_stops_before_the_edge_and_says_why() -> None:
     assert boat.speed_mps < 0.01
 
 
+def test_the_boat_stops_before_land_as_before_a_fence() -> None:
+    shore = box(Keep.OUT, 40, -30, 50, 30)
+    mission = msgspec.structs.replace(mission_of_route(straight_to((5, 4), (80, 4))), land=(shore,))
+    boat = DriftingBoat(mission, PAANI, (30.0, 4.0))
+    assert boat.settle(60.0).inhibits == (Inhibit.OUTSIDE_FENCE,)
+    assert 37.0 < boat.x_m < 40.0 - 0.5 * PAANI.fence_margin_m
+    aground = DriftingBoat(mission, PAANI, (44.0, 4.0))
+    assert aground.settle(5.0).inhibits == (Inhibit.OUTSIDE_FENCE,)
+
+
 def test_a_boat_pushed_out_stays_still_or_comes_back() -> None:
     mission = msgspec.structs.replace(mission_of_route(straight_to((5, 4), (30, 4))), fence=FENCE)
     still = DriftingBoat(mission, PAANI, (44.0, 4.0))
