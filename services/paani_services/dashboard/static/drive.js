@@ -169,13 +169,17 @@ export function renderDrive(store, open, now, isAway) {
   dataset.driving = String(canDrive);
   setText(byId("drive-wheel"), operator ? `${name} ${WHEEL_TEXTS.holds}` : WHEEL_TEXTS.silent);
   byId("drive-take").hidden = !operator || isHolder || isFree;
+  /** Names of the modes that may not start, by the reason. @type {Map<string, string[]>} */
+  const barred = new Map();
   for (const button of /** @type {NodeListOf<HTMLButtonElement>} */ (document.querySelectorAll("[data-drive]"))) {
     const mode = String(button.dataset.drive), bar = operator?.barred.find((/** @type {any} */ each) => each.mode === mode)?.refusal;
     const reason = !operator ? "unknown" : !isHolder && !isFree ? MODE_BARS.NOT_HOLDER : bar ? MODE_BARS[bar] : "";
     button.disabled = Boolean(reason);
+    if (reason) barred.set(reason, [...(barred.get(reason) ?? []), MODE_TEXTS[mode][0]]);
     button.setAttribute("aria-pressed", String(operator?.mode === mode));
     setText(button.querySelector("span"), reason || MODE_TEXTS[mode][1]);
   }
+  setText(byId("drive-bars"), [...barred].map(([reason, names]) => `${names.join(", ")}: ${reason}`).join(" · "));
   byId("drive-hand").hidden = !canDrive;
   if (begins) showWhatOneDrivesBy();
   const leftS = operator ? operator.override_ms / 1000 : 0;
