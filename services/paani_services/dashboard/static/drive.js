@@ -22,6 +22,8 @@ let number = Date.now(), underWay = 0, refusal = "", canDrive = false;
 const held = new Set();
 /** Where the stick is held: ahead and to port, each in [-1, 1]; null while it is not. @type {[number, number] | null} */
 let stick = null;
+/** The pointer that holds the stick: no other finger moves it or lets it go. */
+let pointer = 0;
 /** Whether the gamepad was in neutral since it was last let go: one that is held from before drives nothing. */
 let isPadFree = false;
 
@@ -100,13 +102,16 @@ function askedText(surge, turn) {
 function bindStick() {
   const pad = byId("stick");
   pad.addEventListener("pointerdown", (/** @type {PointerEvent} */ event) => {
-    if (!canDrive) return;
-    pad.setPointerCapture(event.pointerId);
+    if (!canDrive || stick) return;
+    pointer = event.pointerId;
+    pad.setPointerCapture(pointer);
     moveStick(event);
     void say();
   });
-  pad.addEventListener("pointermove", (/** @type {PointerEvent} */ event) => stick && moveStick(event));
-  for (const name of ["pointerup", "pointercancel", "lostpointercapture"]) pad.addEventListener(name, () => letGo());
+  pad.addEventListener("pointermove", (/** @type {PointerEvent} */ event) => stick && event.pointerId === pointer && moveStick(event));
+  for (const name of ["pointerup", "pointercancel", "lostpointercapture"]) {
+    pad.addEventListener(name, (/** @type {PointerEvent} */ event) => event.pointerId === pointer && letGo());
+  }
   pad.addEventListener("contextmenu", (/** @type {Event} */ event) => event.preventDefault());
 }
 
