@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import pytest
@@ -18,6 +19,17 @@ DRAW = """async (tracks) => {
   drawBoxes({ ctx, width: 400, height: 300, unit: 1 }, { detections: [] }, { tracks });
   return [drawn, leaders];
 }"""
+
+CORRIDORS = {"left": [0.03, 0.39], "center": [0.31, 0.69], "right": [0.61, 0.97], "top": 0.3}
+ADVISORY = {"left": {"risk": 0.8, "blocked": True}, "center": {"risk": 0.8, "blocked": True}, "right": {"risk": 0.25}}
+DRAW_CORRIDORS = f"""async ([width, advisory]) => {{
+  const {{ drawCorridors }} = await import("/static/overlay.js"), texts = [], boxes = [];
+  const ctx = new OffscreenCanvas(width, 180).getContext("2d");
+  ctx.fillText = (text) => texts.push(text);
+  ctx.fillRect = (...box) => ctx.fillStyle instanceof CanvasGradient || boxes.push(box);
+  drawCorridors({{ ctx, width, height: 180, unit: 1 }}, {json.dumps(CORRIDORS)}, advisory ?? undefined);
+  return [texts, boxes];
+}}"""
 
 
 def track(number: int, left: float, top: float) -> dict[str, Any]:
@@ -56,3 +68,18 @@ async def test_a_label_with_room_stands_above_its_box(scripts_page: Any) -> None
     ((_, top, _, height),), leaders = await scripts_page.evaluate(DRAW, [track(1, 0.2, 0.5)])
     assert leaders == 0
     assert top + height <= 150
+
+
+@pytest.mark.parametrize(
+    ("width", "words"),
+    [(600, ["0.80 blocked", "0.80 blocked", "0.25 clear"]), (240, ["0.80", "0.80", "0.25"])],
+    ids=["room for words", "a small picture"],
+)
+async def test_no_corridors_label_hides_anothers(scripts_page: Any, width: int, words: list[str]) -> None:
+    texts, boxes = await scripts_page.evaluate(DRAW_CORRIDORS, [width, ADVISORY])
+    assert texts == words
+    assert not any(overlaps(a, b) for index, a in enumerate(boxes) for b in boxes[:index]), boxes
+
+
+async def test_corridors_without_a_verdict_have_their_names(scripts_page: Any) -> None:
+    assert (await scripts_page.evaluate(DRAW_CORRIDORS, [600, None]))[0] == ["left", "centre", "right"]

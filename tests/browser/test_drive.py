@@ -17,6 +17,7 @@ from paani.config import Config
 from paani.messages import DriveMode
 from tests.arming import arm_on_page
 from tests.browser.conftest import Boat
+from tests.browser.test_legibility import SIDEWAYS
 from tests.browser.test_page import until, watch
 from tests.conftest import OpenAs, Spawn
 
@@ -156,6 +157,9 @@ async def test_a_hand_on_the_page_drives_while_it_holds_and_the_wheel_is_taken_o
         await other.wait_for_selector("#drive-take:visible", timeout=WAIT_S * 1e3)
         assert await other.is_disabled("[data-drive=IDLE]")
         assert "another page" in await other.inner_text("#drive-wheel")
+        await other.set_viewport_size({"width": 360, "height": 740})
+        await other.wait_for_timeout(300)
+        assert await other.evaluate(SIDEWAYS) == [], "the button is whole on a phone"
         await other.click("#drive-take")
         await orders.until(lambda found: found.mode is DriveMode.IDLE)
         await until(page, "document.querySelector('#drive').dataset.driving === 'false'")

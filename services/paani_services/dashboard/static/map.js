@@ -13,6 +13,7 @@ import { isReplay } from "./inhibits.js";
 import { RouteEditor } from "./route_editor.js";
 import { MAP_TEXTS, byId, fixed, screenScale, setText } from "./text.js";
 
+const FIT_PX = 36; // of the map that a whole route leaves free, for its numbers
 const AHEAD_PART = 0.22; // of the map's height, by which the boat stands below the middle where its bow is up
 
 export class MapPanel {
@@ -131,7 +132,8 @@ export class MapPanel {
     const xs = points.map((p) => p.x_m), ys = points.map((p) => p.y_m), { canvas, scale } = this, width = canvas.clientWidth / scale, height = canvas.clientHeight / scale;
     const [x1, x2, y1, y2] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
     this.centre = { x: (x1 + x2) / 2, y: (y1 + y2) / 2 };
-    this.pxPerM = Math.min(width / (x2 - x1 + 12), height / (y2 - y1 + 12));
+    const room = (/** @type {number} */ px) => Math.max(px - FIT_PX, px / 2);
+    this.pxPerM = Math.min(room(width) / (x2 - x1 + 6), room(height) / (y2 - y1 + 6));
     this.fitRoute = false;
   }
 }

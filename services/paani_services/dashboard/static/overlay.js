@@ -1,12 +1,13 @@
 // @ts-check
 // Draws the results of perception and advisor over the picture they belong to, in its normalised coordinates.
 
-import { EXPLANATION_TEXTS, fixed, trackLabel, words } from "./text.js";
+import { EXPLANATION_TEXTS, fixed, trackLabel } from "./text.js";
 
 export const MASK_RGBA = [[23, 184, 214, 66], [242, 140, 30, 100], [36, 56, 143, 84]];
 const ACCEPTED = "#ffb454", TENTATIVE = "#c9d3da", IMMEDIATE = "#ff4d52";
 const BLOCKED = "#ff5a5f", CLEAR = "#57d69b", UNKNOWN = "#9fb0bb", OWN_HULL = "#ebf3f8";
 const LABEL_HEIGHT_PX = 18, LABEL_PITCH_PX = 19;
+const LANES = /** @type {const} */ (["left", "center", "right"]);
 
 /**
  * A class mask as a tinted, transparent canvas.
@@ -114,8 +115,8 @@ export function freeTop(above, below, pitch, { left, width }, taken) {
 
 /** Corridor brackets along the bottom. @param {Pane} pane @param {any} corridors @param {any} advisory of the same frame, or undefined */
 export function drawCorridors(pane, corridors, advisory) {
-  const { ctx, width, height, unit } = pane;
-  for (const [index, name] of ["left", "center", "right"].entries()) {
+  const { ctx, width, height, unit } = pane, labels = corridorLabels(pane, corridors, advisory);
+  for (const [index, name] of LANES.entries()) {
     const [from, to] = corridors[name];
     const lane = advisory?.[name];
     const colour = lane ? (lane.blocked ? BLOCKED : CLEAR) : UNKNOWN;
@@ -134,9 +135,20 @@ export function drawCorridors(pane, corridors, advisory) {
     ctx.lineTo(x2, base);
     ctx.lineTo(x2, base - 12 * unit);
     ctx.stroke();
-    const verdict = lane ? `${fixed(lane.risk)} ${EXPLANATION_TEXTS.verdicts[lane.blocked ? "blocked" : "clear"]}` : words(name);
-    drawLabel(pane, verdict, { ...placeLabel(pane, verdict, (x1 + x2) / 2, 0.5), top: height - 33 * unit }, colour);
+    const [text, place] = labels[index];
+    drawLabel(pane, text, { ...place, top: height - 33 * unit }, colour);
   }
+}
+
+/** What stands at each corridor, and where: in a small picture the risk alone, since its colour says the verdict. @param {Pane} pane @param {any} corridors @param {any} advisory @returns {[string, LabelPlace][]} */
+function corridorLabels(pane, corridors, advisory) {
+  const labelled = (/** @type {boolean} */ isWhole) => LANES.map((name) => {
+    const lane = advisory?.[name], verdict = isWhole && lane ? ` ${EXPLANATION_TEXTS.verdicts[lane.blocked ? "blocked" : "clear"]}` : "";
+    const text = lane ? fixed(lane.risk) + verdict : EXPLANATION_TEXTS.corridors[name].toLowerCase();
+    return /** @type {[string, LabelPlace]} */ ([text, placeLabel(pane, text, ((corridors[name][0] + corridors[name][1]) / 2) * pane.width, 0.5)]);
+  });
+  const whole = labelled(true);
+  return whole.some(([, place], index) => index && whole[index - 1][1].left + whole[index - 1][1].width > place.left) ? labelled(false) : whole;
 }
 
 /** The upper edge of the corridors. @param {Pane} pane @param {number} top */

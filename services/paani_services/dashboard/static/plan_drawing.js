@@ -1,6 +1,8 @@
 // @ts-check
 // Draws the mission that is being made: its lines and points, the one at hand larger, and a sign at each fault.
 
+const NUMBER_PX = 24; // between points that have their numbers beside them
+
 /**
  * @param {import("./map_objects.js").Chart} chart @param {import("./mission_plan.js").MissionPlan} made
  * @param {import("./mission_checks.js").Mark[]} marks
@@ -20,6 +22,8 @@ function drawItem({ ctx, toScreen, pxPerM, colour }, made, index) {
   if (!("kind" in item && item.kind === "rally")) for (const point of points) ctx.lineTo(...toScreen(point.x_m, point.y_m));
   if (made.isClosed(index) && points.length > 2) ctx.closePath();
   ctx.stroke();
+  /** @type {[number, number]} */
+  let numbered = [-Infinity, 0];
   points.forEach((point, number) => {
     const [x, y] = toScreen(point.x_m, point.y_m), isAtHand = isCurrent && number === made.point;
     ctx.beginPath();
@@ -34,7 +38,9 @@ function drawItem({ ctx, toScreen, pxPerM, colour }, made, index) {
       ctx.strokeStyle = colour("--text");
       ctx.stroke();
     }
-    if (isCurrent) ctx.fillText(String(number + 1), x + 9, y - 7);
+    if (!isCurrent || (!isAtHand && Math.hypot(x - numbered[0], y - numbered[1]) < NUMBER_PX)) return;
+    numbered = [x, y];
+    ctx.fillText(String(number + 1), x + 9, y - 7);
   });
   ctx.globalAlpha = 1;
 }
