@@ -22,7 +22,7 @@ from paani_services.advisor.candidates import candidate_obstacles
 from paani_services.advisor.counterfactual import find_counterfactual
 from paani_services.advisor.explanation import explain_advisory
 from paani_services.advisor.frame_facts import FrameFacts, PolicyState, frame_facts, side_block_risk
-from paani_services.advisor.people import nearest_ahead_m, speed_limit_mps
+from paani_services.advisor.people import may_keep_station, nearest_ahead_m, speed_limit_mps
 from paani_services.advisor.policy import Decision, advised_purpose, decide, frame_components
 from paani_services.advisor.risk import ALL_EVIDENCE, LANES, lane_water, obstacles_from_tracks
 from paani_services.advisor.tracker import (
@@ -126,6 +126,7 @@ def _add_people(decision: Decision, facts: FrameFacts, config: Config) -> Decisi
         people_ahead=tuple(person.id for person in people) if config.advisor.people.use else msgspec.UNSET,
         candidates_ahead=candidates or msgspec.UNSET,
         person_distance_m=msgspec.UNSET if distance_m is None else distance_m,
+        may_keep_station=may_keep_station(decision.reason, facts.obstacles, config) or msgspec.UNSET,
     )
 
 
@@ -150,7 +151,13 @@ def _decision_at(state: AdvisorState, now_us: int, config: Config) -> Decision:
 
 
 def _stop_for(decision: Decision, reason: Reason) -> Decision:
-    return msgspec.structs.replace(decision, direction=Direction.STOP, reason=reason, counterfactual=NEEDS_NEW_EVIDENCE)
+    return msgspec.structs.replace(
+        decision,
+        direction=Direction.STOP,
+        reason=reason,
+        counterfactual=NEEDS_NEW_EVIDENCE,
+        may_keep_station=msgspec.UNSET,
+    )
 
 
 def _advisory_message(decision: Decision, evidence: Evidence, now_us: int, config: Config) -> Advisory:
@@ -177,4 +184,5 @@ def _advisory_message(decision: Decision, evidence: Evidence, now_us: int, confi
         people_ahead=decision.people_ahead,
         person_distance_m=decision.person_distance_m,
         candidates_ahead=decision.candidates_ahead,
+        may_keep_station=decision.may_keep_station,
     )

@@ -7,8 +7,10 @@ held. Distances are those of the box's foot where the camera is calibrated; with
 from collections.abc import Iterable
 
 from paani.config import Config
+from paani.messages import Reason
 from paani_services.advisor.risk import Obstacle, lane_span, shared_width
 
+WATER_STOPS = frozenset({Reason.NO_SAFE_SIDE, Reason.NO_SIDE_UNOCCUPIED})  # for what lies on the water that is seen
 MIN_GLIMPSE_PRESENCE = 0.5  # presence below which a person seen once, and no more, blocks nothing
 
 
@@ -54,6 +56,17 @@ def speed_limit_mps(obstacles: Iterable[Obstacle], config: Config) -> float | No
     if not config.calibration.valid:
         limits_mps.append(people.uncalibrated_mps)
     return min(limits_mps, default=None)
+
+
+def may_keep_station(reason: Reason, obstacles: Iterable[Obstacle], config: Config) -> bool:
+    """Whether thrust may hold the boat where a STOP for this reason finds it: nobody is near, as far as is known.
+
+    Nobody is where everybody who counts is farther than `stop_m`; without a calibration nobody knows.
+    """
+    if not config.advisor.people.use or not config.calibration.valid or reason not in WATER_STOPS:
+        return False
+    distances_m = [each.distance_m for each in obstacles if counts(each)]
+    return all(each is not None and each > config.advisor.people.stop_m for each in distances_m)
 
 
 def nearest_ahead_m(obstacles: tuple[Obstacle, ...], ahead: Iterable[int]) -> float | None:

@@ -76,6 +76,7 @@ class Decision(msgspec.Struct, frozen=True, rename={"policy_input": "standing"})
     people_ahead: tuple[int, ...] | msgspec.UnsetType = msgspec.UNSET
     person_distance_m: float | msgspec.UnsetType = msgspec.UNSET
     candidates_ahead: tuple[int, ...] | msgspec.UnsetType = msgspec.UNSET
+    may_keep_station: bool | msgspec.UnsetType = msgspec.UNSET
 
 
 def frame_components(facts: FrameFacts, evidence: Selection, config: Config) -> dict[str, LaneComponents]:

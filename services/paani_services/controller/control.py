@@ -63,12 +63,17 @@ def compute_thrust(
     if state.last_us:
         step_s = clip((now_us - state.last_us) * 1e-6, 0.0, MAX_STEP_S)
 
+    if command.keeps_station:
+        state = _without_way(state, odometry)
     speed_error_mps, forward, integral = _forward_thrust(state.integral, command, odometry, step_s, config)
+    max_steer = config.max_steer
+    if command.keeps_station:
+        max_steer = min(max_steer, config.astern + forward)  # a couple, of which neither fan's part is cut
     heading_error_rad = wrap_rad(command.heading_rad - odometry.yaw_rad)
     steering = clip(
         config.heading_kp * heading_error_rad - config.heading_kd * odometry.yaw_rate_radps,
-        -config.max_steer,
-        config.max_steer,
+        -max_steer,
+        max_steer,
     )
     left, right = (
         _limit_slew(last, clip(wanted, 0.0 - config.astern, 1.0), config.slew_per_s * step_s)
@@ -84,6 +89,14 @@ def compute_thrust(
         heading_error_rad=heading_error_rad,
         command_sent_us=command.sent_us,
     )
+
+
+def _without_way(state: ControllerState, odometry: Odometry) -> ControllerState:
+    """The state without the thrust and the integral that push the way the boat goes already."""
+    surge_mps = odometry.surge_mps
+    if (state.left + state.right) * surge_mps > 0.0:
+        state = msgspec.structs.replace(state, left=0.0, right=0.0)
+    return msgspec.structs.replace(state, integral=0.0) if state.integral * surge_mps > 0.0 else state
 
 
 def find_inhibits(inputs: ControllerInputs, now_us: int, domain: int, config: ControllerConfig) -> tuple[Inhibit, ...]:
@@ -151,6 +164,7 @@ def _is_valid(command: NavCommand) -> bool:
         and not (command.speed_mps > 0.0 and command.astern_mps > 0.0)
         and command.frame == MAP_FRAME
         and not (command.enable and command.inhibits)
+        and not (command.keeps_station and (command.speed_mps or command.astern_mps or not command.vetoes))
     )
 
 

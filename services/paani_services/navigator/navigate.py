@@ -21,7 +21,6 @@ from paani.messages import (
     NavCommand,
     Odometry,
     OperatorOrder,
-    Purpose,
     SimTime,
     Tracks,
 )
@@ -50,6 +49,7 @@ from paani_services.navigator.guidance.visual_turns import (
     TURN_SIDE,
     VisualTurn,
     constant_rate_heading_rad,
+    is_turn_to_look,
     latch_heading,
 )
 from paani_services.navigator.mapping.observed_cells import Camera
@@ -145,7 +145,11 @@ def navigate(
     leg = describe_leg(state.progress, mission)
     cross_m = setpoint.cross_track_m
     if inhibits:
-        return hold_cross_track(state, now_us), build_command(state, inputs, now_us, inhibits, cross_m=cross_m, leg=leg)
+        state = hold_cross_track(state, now_us)
+        keeps_station = is_planned and config.keep_station and may_keep_station(inhibits, advisory)
+        return state, build_command(
+            state, inputs, now_us, inhibits, odometry.yaw_rad, keeps_station=keeps_station, cross_m=cross_m, leg=leg
+        )
     heading_rad, limit_mps = setpoint.course_rad, speed_limit_mps(advisory)
     speed_mps = min(setpoint.speed_mps, limit_mps)
     if direction in TURN_DIRECTIONS:
@@ -161,7 +165,7 @@ def navigate(
     if is_planned and not inhibits and speed_mps > 0.0:
         # The planner weighs the advised side against what the map shows.
         planner_setpoint = GuidanceSetpoint(
-            heading_rad, speed_mps, TURN_SIDE.get(direction, 0.0), is_pivot_only=_is_turn_to_look(advisory)
+            heading_rad, speed_mps, TURN_SIDE.get(direction, 0.0), is_pivot_only=is_turn_to_look(advisory)
         )
         state, heading_rad, speed_mps, is_path_free = _steer_planned(
             state, odometry, planner_setpoint, now_us, camera, config, mission.bounds, planner
@@ -198,6 +202,11 @@ def begin_step(
         planner_state = observe(state.planner_state, inputs.odometry, inputs.evidence, config.planner, inputs.tracks)
         state = msgspec.structs.replace(state, planner_state=planner_state)
     return state, inhibits
+
+
+def may_keep_station(inhibits: list[Inhibit], advisory: Advisory | None) -> bool:
+    """Whether nothing but the advice forbids motion, and the advice allows thrust that holds the boat where it is."""
+    return inhibits == [Inhibit.ADVISED_STOP] and advisory is not None and advisory.may_keep_station is True
 
 
 def _advance_mission(
@@ -243,21 +252,6 @@ def speed_limit_mps(advisory: Advisory | None) -> float:
     if advisory is None or isinstance(advisory.speed_limit_mps, msgspec.UnsetType):
         return math.inf
     return advisory.speed_limit_mps
-
-
-def _is_turn_to_look(advisory: Advisory | None) -> bool:
-    """Whether the advised turn is to look for a way, not to go there."""
-    if advisory is None:
-        return False
-    purpose = _infer_purpose(advisory) if advisory.purpose is Purpose.UNSAID else advisory.purpose
-    return purpose is Purpose.LOOK
-
-
-def _infer_purpose(advisory: Advisory) -> Purpose:
-    """The purpose of a recorded advisory that does not say it: a turn towards a side that is blocked is to look."""
-    side = TURN_SIDE.get(advisory.direction, 0.0)
-    is_blocked = (side > 0.0 and advisory.left.blocked) or (side < 0.0 and advisory.right.blocked)
-    return Purpose.LOOK if is_blocked else Purpose.PASS
 
 
 def _integrate_cross_track(
@@ -367,12 +361,15 @@ def build_command(
     *,
     astern_mps: float = 0.0,
     vetoes: tuple[Inhibit, ...] = (),
+    keeps_station: bool = False,
     cross_m: float = 0.0,
     leg: str = "",
     obstacle_track_ids: tuple[int, ...] = (),
 ) -> NavCommand:
-    """The order; one with an inhibit is disabled, whatever else is asked for."""
+    """The order; one with an inhibit is disabled, whatever else is asked for, but for one that keeps the station."""
     advisory = inputs.advisory
+    if keeps_station:
+        vetoes, inhibits = tuple(inhibits), []
     enable = not inhibits
     return NavCommand(
         source_us=advisory.source_us if advisory is not None else now_us,
@@ -381,6 +378,7 @@ def build_command(
         speed_mps=speed_mps if enable else 0.0,
         astern_mps=astern_mps if enable else 0.0,
         vetoes=vetoes,
+        keeps_station=keeps_station,
         echo_us=inputs.clock.stamp_us if inputs.clock is not None else 0,
         inhibits=tuple(inhibits),
         direction=advisory.direction if advisory is not None else Direction.NO_DATA,

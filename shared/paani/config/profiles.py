@@ -48,6 +48,7 @@ PAPER: dict[str, object] = {
         "crab_gain_mps": 0.0,  # M4
         "cruise_mps": 0.15,  # M7
         "clear_m": 0.0,
+        "keep_station": False,
         "latch_turns": False,  # M5: continuous
         "planner": {  # Q: a prototype beside the evaluated configuration
             "use": False,

@@ -245,6 +245,8 @@ class Advisory(Message, frozen=True, kw_only=True):
     people_ahead: tracks of people who block the way ahead, unset where people are weighed as anything else.
     candidates_ahead: numbers of `Evidence.candidates`, from 1, that block the way ahead, as they may be people; unset
     where none does. person_distance_m: of the nearest of all of these, unset where no calibration tells it.
+    may_keep_station: a STOP for what lies on the water, in a picture that is fit, with nobody near: thrust may hold the
+    boat where it is. Unset for every other advice.
     """
 
     direction: Direction
@@ -268,3 +270,4 @@ class Advisory(Message, frozen=True, kw_only=True):
     people_ahead: tuple[Count, ...] | msgspec.UnsetType = msgspec.UNSET
     person_distance_m: NonNegative | msgspec.UnsetType = msgspec.UNSET
     candidates_ahead: tuple[Count, ...] | msgspec.UnsetType = msgspec.UNSET
+    may_keep_station: bool | msgspec.UnsetType = msgspec.UNSET

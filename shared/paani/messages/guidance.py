@@ -52,7 +52,8 @@ class NavCommand(Message, frozen=True, kw_only=True):
     the same in words.
     `obstacle_track_ids`: the advisor's tracks of the dynamic obstacles that the plan in force was made for.
     `astern_mps`: the speed astern that a hand asks for, only where `speed_mps` is 0. `vetoes`: why a hand gets no
-    thrust ahead, while it may turn and go astern.
+    thrust ahead, while it may turn and go astern. `keeps_station`: the advice stops the boat, which `vetoes` names, and
+    thrust may only work against the way that it makes; both speeds are 0.
     """
 
     enable: bool
@@ -71,12 +72,16 @@ class NavCommand(Message, frozen=True, kw_only=True):
     obstacle_track_ids: tuple[Count, ...] = ()
     astern_mps: NonNegative = 0.0
     vetoes: tuple[Inhibit, ...] = ()
+    keeps_station: bool = False
 
     def is_news_after(self, sent: NavCommand | None) -> bool:
         """Whether evidence, advice or inhibits differ from those of the order sent before: then it is sent at once."""
         if sent is None:
             return True
-        return (self.source_us, self.direction, self.inhibits) != (sent.source_us, sent.direction, sent.inhibits)
+        return self._news() != sent._news()
+
+    def _news(self) -> tuple[object, ...]:
+        return self.source_us, self.direction, self.inhibits, self.keeps_station
 
 
 class Waypoint(msgspec.Struct, frozen=True, kw_only=True):

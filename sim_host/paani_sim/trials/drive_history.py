@@ -91,11 +91,11 @@ class DriveHistory:
 
     def _update_stops(self, t_s: float, command: m.NavCommand, advisory: m.Advisory | None) -> None:
         is_stopped = bool(self.stops) and self.stops[-1].ended_s is None
-        if command.enable:
+        if command.enable and not command.keeps_station:
             if is_stopped:
                 self.stops[-1] = self.stops[-1]._replace(ended_s=t_s)
             return
-        first = command.inhibits[0]
+        first = (command.vetoes if command.keeps_station else command.inhibits)[0]
         if first is m.Inhibit.NOT_ARMED:
             return
         reason = advisory.reason.value if first is m.Inhibit.ADVISED_STOP and advisory else first.value

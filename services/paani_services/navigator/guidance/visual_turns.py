@@ -12,7 +12,7 @@ import msgspec
 from paani.clock import has_passed
 from paani.config import NavigatorConfig
 from paani.geometry import wrap_rad
-from paani.messages import Direction
+from paani.messages import Advisory, Direction, Purpose
 
 ON_HEADING_RAD = math.radians(5.0)  # a boat this near to its latched heading holds it
 
@@ -92,3 +92,18 @@ def _latch_next(
 def _turn_step_rad(direction: Direction, config: NavigatorConfig) -> float:
     step_deg = config.slight_turn_deg if direction in _SLIGHT_TURNS else config.turn_deg
     return TURN_SIDE[direction] * math.radians(step_deg)
+
+
+def is_turn_to_look(advisory: Advisory | None) -> bool:
+    """Whether the advised turn is to look for a way, not to go there."""
+    if advisory is None:
+        return False
+    purpose = _infer_purpose(advisory) if advisory.purpose is Purpose.UNSAID else advisory.purpose
+    return purpose is Purpose.LOOK
+
+
+def _infer_purpose(advisory: Advisory) -> Purpose:
+    """The purpose of a recorded advisory that does not say it: a turn towards a side that is blocked is to look."""
+    side = TURN_SIDE.get(advisory.direction, 0.0)
+    is_blocked = (side > 0.0 and advisory.left.blocked) or (side < 0.0 and advisory.right.blocked)
+    return Purpose.LOOK if is_blocked else Purpose.PASS

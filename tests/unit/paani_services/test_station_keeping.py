@@ -1,0 +1,157 @@
+"""A boat that the advice stops is held where it is: when thrust may do so, and that it only works against its way."""
+
+from __future__ import annotations
+
+import math
+
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from paani import messages as m
+from paani.config import ControllerConfig, load_config
+from paani.messages import Direction, Inhibit
+from paani_services.advisor.advise import advise
+from paani_services.advisor.people import may_keep_station
+from paani_services.controller.control import ControllerInputs, ControllerState, compute_thrust
+from paani_services.navigator.navigate import navigate
+from tests.synthetic_water import CAMERA
+from tests.unit.paani_services.advisor.advisor_evidence import CALIBRATED, CLEAR, PAPER, play
+from tests.unit.paani_services.advisor.test_people import AHEAD, FRAMES, LEFT, person
+from tests.unit.paani_services.navigator.test_interlocks import MISSION
+from tests.unit.paani_services.navigator.test_navigate import NOW_US, RUNNING, advice, inputs, pose
+
+CONTROLLER, NAVIGATOR = load_config().controller, load_config().navigator
+STOP_M = CALIBRATED.advisor.people.stop_m
+LAND = m.LaneEvidence(non_water=1.0, uncertainty=0.8, clear_width=0.0)
+LAND_ALL_ROUND = msgspec.structs.replace(CLEAR, left=LAND, center=LAND, right=LAND)
+STOPPED = msgspec.structs.replace(advice(Direction.STOP), reason=m.Reason.NO_SAFE_SIDE, may_keep_station=True)
+
+
+@given(FRAMES, st.booleans())
+def test_only_a_stop_for_what_lies_on_the_water_allows_it(frame: m.Evidence, is_calibrated: bool) -> None:
+    advisory = play([frame], CALIBRATED if is_calibrated else load_config())[1][0]
+    is_for_water = advisory.reason in {m.Reason.NO_SAFE_SIDE, m.Reason.NO_SIDE_UNOCCUPIED}
+    assert (advisory.may_keep_station is True) == (is_calibrated and is_for_water)
+    assert not is_for_water or advisory.direction is Direction.STOP
+
+
+def test_land_all_round_allows_it_until_the_picture_is_old_or_unfit_and_the_paper_never_does() -> None:
+    state, (seen,), _ = play([LAND_ALL_ROUND], CALIBRATED)
+    assert seen.may_keep_station is True
+    _, old, _ = advise(state, None, seen.source_us + 60_000_000, CALIBRATED)
+    assert (old.direction, old.reason, old.may_keep_station) == (Direction.STOP, m.Reason.STALE_EVIDENCE, msgspec.UNSET)
+    black = msgspec.structs.replace(LAND_ALL_ROUND, usable=False, cause=m.UnusableCause.BLACK)
+    assert play([LAND_ALL_ROUND, black], CALIBRATED)[1][-1].may_keep_station is msgspec.UNSET
+    paper = msgspec.structs.replace(PAPER, calibration=CALIBRATED.calibration)
+    stopped = play([LAND_ALL_ROUND], paper)[1][0]
+    assert stopped.reason is m.Reason.NO_SAFE_SIDE
+    assert b"may_keep_station" not in msgspec.json.encode(stopped)
+
+
+@pytest.mark.parametrize(
+    ("somebody", "may"),
+    [
+        (person(distance_m=STOP_M), False),
+        (person(distance_m=STOP_M + 0.01), True),
+        (person(LEFT, distance_m=STOP_M), False),  # anywhere in the picture
+        (person(AHEAD), False),  # at no known distance
+        (person(AHEAD, candidate=1), False),  # what may be a person counts as one
+        (person(AHEAD, is_person=False, distance_m=0.5), True),
+        (person(AHEAD, is_ashore=True, distance_m=0.5), True),
+    ],
+)
+def test_nobody_may_be_near(somebody: object, may: bool) -> None:
+    far_off = person(distance_m=12.0)
+    assert may_keep_station(m.Reason.NO_SAFE_SIDE, (far_off, somebody), CALIBRATED) is may
+    assert not may_keep_station(m.Reason.UNUSABLE_IMAGE, (far_off,), CALIBRATED)
+    assert not may_keep_station(m.Reason.NO_SAFE_SIDE, (far_off,), load_config())
+
+
+def test_an_order_that_keeps_the_station_asks_for_no_speed_and_names_its_veto() -> None:
+    _, order = navigate(
+        RUNNING, inputs(advisory=STOPPED, odometry=pose(3.0, 0.0, 0.4)), MISSION, NOW_US, 43, NAVIGATOR, CAMERA
+    )
+    assert (order.enable, order.keeps_station, order.inhibits) == (True, True, ())
+    assert (order.speed_mps, order.astern_mps, order.heading_rad) == (0.0, 0.0, pytest.approx(0.4))
+    assert (order.vetoes, order.direction) == ((Inhibit.ADVISED_STOP,), Direction.STOP)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"advisory": advice(Direction.STOP)},
+        {"advisory": msgspec.structs.replace(STOPPED, may_keep_station=False)},
+        {"advisory": msgspec.structs.replace(STOPPED, direction=Direction.NO_DATA)},
+        {"advisory": msgspec.structs.replace(STOPPED, source_us=NOW_US - 60_000_000)},
+        {"arming": m.Arming(source_us=NOW_US, armed=False)},
+        {"arming": m.Arming(source_us=NOW_US, armed=True, stopped=True)},
+        {"odometry": msgspec.structs.replace(pose(3.0, 0.0), healthy=False)},
+        {"clock": None},
+    ],
+)
+def test_whatever_else_forbids_motion_forbids_this_too(changes: dict[str, object]) -> None:
+    given_inputs = inputs(**({"advisory": STOPPED} | changes))
+    _, order = navigate(RUNNING, given_inputs, MISSION, NOW_US, 43, NAVIGATOR, CAMERA)
+    assert (order.enable, order.keeps_station) == (False, False)
+    assert order.inhibits
+
+
+@pytest.mark.parametrize("off", ["navigator.keep_station=false", "navigator.planner.use=false"])
+def test_it_can_be_switched_off_and_needs_the_planner(off: str) -> None:
+    config = load_config(sets=[off]).navigator
+    _, order = navigate(RUNNING, inputs(advisory=STOPPED), MISSION, NOW_US, 43, config, CAMERA)
+    assert order.inhibits == (Inhibit.ADVISED_STOP,)
+    _, order = navigate(RUNNING, inputs(advisory=STOPPED), MISSION, NOW_US, 43, NAVIGATOR)
+    assert order.inhibits == (Inhibit.ADVISED_STOP,), "without a calibration"
+
+
+KEEPING = m.NavCommand(
+    source_us=NOW_US, enable=True, heading_rad=0.0, speed_mps=0.0, direction=Direction.STOP,
+    vetoes=(Inhibit.ADVISED_STOP,), keeps_station=True,
+)  # fmt: skip
+
+
+def thrust_for(
+    order: m.NavCommand, start: ControllerState, config: ControllerConfig = CONTROLLER, **motion: float
+) -> m.Thrust:
+    at = m.Odometry(source_us=NOW_US, x_m=0.0, y_m=0.0, healthy=True, **{"yaw_rad": 0.0, "surge_mps": 0.0} | motion)
+    return compute_thrust(start, ControllerInputs(order, NOW_US, at, NOW_US), NOW_US, 43, config)[1]
+
+
+ONLY_PUSHING = load_config(profile="fans").controller
+FAN, PART = st.floats(-CONTROLLER.astern, 1.0), st.floats(-CONTROLLER.max_integral, CONTROLLER.max_integral)
+
+
+@pytest.mark.parametrize("config", [CONTROLLER, ONLY_PUSHING])
+@given(FAN, FAN, PART, st.floats(-1.5, 1.5), st.floats(-math.pi, math.pi), st.floats(-2.0, 2.0))
+def test_both_fans_together_never_push_the_way_the_boat_goes(
+    config: ControllerConfig,
+    left: float,
+    right: float,
+    integral: float,
+    surge_mps: float,
+    heading_rad: float,
+    rate_radps: float,
+) -> None:
+    """Whatever the fans did before, whatever turn is damped: at once, without waiting for the slew limit."""
+    start = ControllerState(integral, max(left, -config.astern), max(right, -config.astern), NOW_US - 100_000)
+    order = msgspec.structs.replace(KEEPING, heading_rad=heading_rad)
+    thrust = thrust_for(order, start, config, surge_mps=surge_mps, yaw_rate_radps=rate_radps)
+    assert thrust.enabled
+    assert (thrust.left + thrust.right) * surge_mps <= 1e-9
+    assert all(-config.astern <= fan <= 1.0 for fan in (thrust.left, thrust.right))
+
+
+@pytest.mark.parametrize("surge_mps", [0.2, -0.2])
+def test_a_boat_that_drifts_is_pushed_back(surge_mps: float) -> None:
+    thrust = thrust_for(KEEPING, ControllerState(last_us=NOW_US - 100_000), surge_mps=surge_mps)
+    assert thrust.left == pytest.approx(thrust.right)
+    assert thrust.left * surge_mps < -1e-3
+
+
+@pytest.mark.parametrize("changes", [{"speed_mps": 0.1}, {"astern_mps": 0.1}, {"vetoes": ()}])
+def test_an_order_that_keeps_the_station_and_asks_for_more_is_invalid(changes: dict[str, object]) -> None:
+    thrust = thrust_for(msgspec.structs.replace(KEEPING, **changes), ControllerState())
+    assert (thrust.enabled, thrust.inhibits) == (False, (Inhibit.COMMAND_INVALID,))
