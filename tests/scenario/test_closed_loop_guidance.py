@@ -31,6 +31,7 @@ from paani.missions import mission_of_route
 from paani.thrust_adapter import AppliedThrust, ThrustAdapter
 from paani_services.controller.control import ControllerInputs, ControllerState, compute_thrust
 from paani_services.localization.choice import create_estimator
+from paani_services.navigator.mapping.occupancy_grid import UNCALIBRATED_CAMERA
 from paani_services.navigator.navigate import NavigatorInputs, NavigatorState, navigate
 from paani_sim.plant.plant import Plant
 from paani_sim.plant.telemetry import gps_message, imu_message
@@ -61,7 +62,7 @@ class Lockstep:
         self.advisory: Advisory | None = None  # takes the place of `direction`
         self.heading_rad: float | None = None  # takes the place of the navigator's
         self.is_ordered_to_stand = False
-        self.armed = True
+        self.armed, self.camera = True, UNCALIBRATED_CAMERA
         self.command: NavCommand | None = None
         self.thrust: Thrust | None = None
         self.odometry: Odometry | None = None
@@ -107,7 +108,9 @@ class Lockstep:
             arming=arming,
             arming_us=now_us,
         )
-        self.nav, self.command = navigate(self.nav, inputs, self.mission, now_us, DOMAIN, self.config.navigator)
+        self.nav, self.command = navigate(
+            self.nav, inputs, self.mission, now_us, DOMAIN, self.config.navigator, self.camera
+        )
         if self.heading_rad is not None:
             self.command = msgspec.structs.replace(self.command, heading_rad=self.heading_rad)
         if self.is_ordered_to_stand:

@@ -66,10 +66,10 @@ def conditions(snapshot: Snapshot) -> dict[str, tuple[int, str]]:
         found["disarmed"] = NOTICE, "disarmed"
     if command is None:
         found["navigator"] = ERROR, "navigator silent"
-    for inhibit in command.inhibits if command is not None else ():
+    for inhibit in command.halt_reasons if command is not None else ():
         if text := INHIBIT_TEXTS.get(inhibit):
             found[inhibit.value] = (INFO if inhibit in CALM else WARNING), text
-    for veto in command.vetoes if command is not None else ():
+    for veto in command.vetoes if command is not None and not command.keeps_station else ():
         found[f"veto {veto}"] = WARNING, f"no thrust ahead: {veto.replace('_', ' ').lower()}"
     if applied is None:
         found["adapter"] = ERROR, "thrust adapter silent"

@@ -101,7 +101,7 @@ class Diagnostics:
             values |= {
                 "direction": order.direction,
                 "speed_mps": order.speed_mps,
-                "inhibits": ", ".join(order.inhibits),
+                "inhibits": ", ".join(order.halt_reasons),
             }
         if applied.zero_cause is m.ZeroCause.NONE:
             return Status(Level.OK, "thrust applied", values)

@@ -154,8 +154,9 @@ def _navigator(moment: Moment) -> list[str]:
     planned_for = [f"planned for {obstacles}"] if (obstacles := _planned_for(moment, order.obstacle_track_ids)) else []
     planned_for += _encounters(moment)
     planned_for += _headings(moment.prediction.headings) if moment.prediction is not None else []
-    if not order.enable:
-        return [f"holds the boat: {inhibits(order.inhibits)}", *planned_for]
+    if order.halt_reasons:
+        holds = "keeps the boat where it is" if order.keeps_station else "holds the boat"
+        return [f"{holds}: {inhibits(order.halt_reasons)}", *planned_for]
     course = f"steer {_heading_deg(order.heading_rad):03.0f} deg at {order.speed_mps:.2f} m/s"
     off = f", {abs(order.cross_track_m):.1f} m {'left' if order.cross_track_m > 0 else 'right'} of the route"
     return [f"{course}, waypoint {order.waypoint_index}{off}", *planned_for]

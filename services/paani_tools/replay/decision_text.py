@@ -11,7 +11,7 @@ def decision_text(message: m.Message) -> str:
         case m.Advisory():
             return message.direction.value
         case m.NavCommand():
-            return f"go {message.direction}" if message.enable else "hold"
+            return "keep station" if message.keeps_station else f"go {message.direction}" if message.enable else "hold"
         case m.Thrust():
             return "thrust" if message.enabled else "no thrust"
         case m.Tracks():
@@ -24,6 +24,8 @@ def reason_text(message: m.Message) -> str:
     match message:
         case m.Advisory():
             return f"{message.reason}: {message.explanation}"
-        case m.NavCommand(enable=False) | m.Thrust(enabled=False):
+        case m.NavCommand():
+            return ", ".join(message.halt_reasons)
+        case m.Thrust(enabled=False):
             return ", ".join(message.inhibits)
     return ""

@@ -74,6 +74,11 @@ class NavCommand(Message, frozen=True, kw_only=True):
     vetoes: tuple[Inhibit, ...] = ()
     keeps_station: bool = False
 
+    @property
+    def halt_reasons(self) -> tuple[Inhibit, ...]:
+        """Why the boat is to stand still, with thrust or without; empty for one that is to move."""
+        return self.vetoes if self.keeps_station else self.inhibits
+
     def is_news_after(self, sent: NavCommand | None) -> bool:
         """Whether evidence, advice or inhibits differ from those of the order sent before: then it is sent at once."""
         if sent is None:

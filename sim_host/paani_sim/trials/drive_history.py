@@ -87,15 +87,16 @@ class DriveHistory:
         if advisory is not None and (not self.advisories or advisory is not self.advisories[-1]):
             self.advisories.append(advisory)
         if command is not None:
-            self._update_stops(t_s, command, advisory)
+            self.record_order(t_s, command, advisory)
 
-    def _update_stops(self, t_s: float, command: m.NavCommand, advisory: m.Advisory | None) -> None:
+    def record_order(self, t_s: float, command: m.NavCommand, advisory: m.Advisory | None) -> None:
+        """Note where a stop begins, ends, or is for another reason; a boat that is kept on station is stopped."""
         is_stopped = bool(self.stops) and self.stops[-1].ended_s is None
-        if command.enable and not command.keeps_station:
+        if not command.halt_reasons:
             if is_stopped:
                 self.stops[-1] = self.stops[-1]._replace(ended_s=t_s)
             return
-        first = (command.vetoes if command.keeps_station else command.inhibits)[0]
+        first = command.halt_reasons[0]
         if first is m.Inhibit.NOT_ARMED:
             return
         reason = advisory.reason.value if first is m.Inhibit.ADVISED_STOP and advisory else first.value

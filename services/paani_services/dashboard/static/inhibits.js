@@ -33,12 +33,14 @@ export const isThrustApplied = (store, now) =>
   store.isFresh("plant/thrust_applied", now) && store.get("plant/thrust_applied").zero_cause === "none";
 
 /**
- * Reasons in the order of the stages; each once, however many processes pass it on. None while thrust is applied.
+ * Reasons in the order of the stages; each once, however many processes pass it on. None while thrust is applied, but
+ * for what stops a boat whose thrust keeps its station.
  * In a replay, what is silent is no reason: orders are not played again.
  * @param {import("./store.js").Store} store @param {number} now @returns {StopReason[]}
  */
 export function findInhibits(store, now) {
-  if (isThrustApplied(store, now)) return [];
+  const order = fresh(store, "navigator/command", now), isApplied = isThrustApplied(store, now);
+  if (isApplied && !order?.keeps_station) return [];
   /** @type {StopReason[]} */
   const found = [];
   const add = (/** @type {string} */ stage, /** @type {string} */ code, /** @type {string} */ text) => {
@@ -53,10 +55,11 @@ export function findInhibits(store, now) {
   for (const [stage, key] of TOPICS) {
     for (const inhibit of fresh(store, key, now)?.inhibits ?? []) add(STAGE_OF_INHIBIT[inhibit] ?? stage, inhibit, inhibitText(store, inhibit));
   }
+  for (const veto of order?.keeps_station ? order.vetoes : []) add(STAGE_OF_INHIBIT[veto] ?? "navigator", veto, inhibitText(store, veto));
   const applied = fresh(store, "plant/thrust_applied", now);
-  if (applied) add("gate", applied.zero_cause, gateText(store, applied, now));
-  const order = Object.keys(STAGES);
-  return found.sort((a, b) => order.indexOf(a.stage) - order.indexOf(b.stage));
+  if (applied && !isApplied) add("gate", applied.zero_cause, gateText(store, applied, now));
+  const stages = Object.keys(STAGES);
+  return found.sort((a, b) => stages.indexOf(a.stage) - stages.indexOf(b.stage));
 }
 
 /** @param {import("./store.js").Store} store @param {string} key @param {number} now */

@@ -54,6 +54,13 @@ def test_a_veto_of_the_stick_is_told(veto: m.Inhibit) -> None:
     assert len(text) <= MAX_TEXT_BYTES
 
 
+def test_a_boat_that_is_kept_on_station_is_told_as_stopped() -> None:
+    vetoes = (m.Inhibit.ADVISED_STOP,)
+    command = m.NavCommand(source_us=0, enable=True, heading_rad=0.0, speed_mps=0.0, vetoes=vetoes, keeps_station=True)
+    assert {text for _, text in conditions(armed(command=command)).values()} >= {"stopped: advised by the camera"}
+    assert not any(key.startswith("veto") for key in conditions(armed(command=command)))
+
+
 def test_silence_is_told() -> None:
     found = {text for _, text in conditions(Snapshot(now_us=NOW_US)).values()}
     assert found == {"operator process silent: not armed", "navigator silent", "thrust adapter silent"}

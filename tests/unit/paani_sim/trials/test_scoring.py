@@ -3,6 +3,7 @@
 import dataclasses
 import math
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given
@@ -194,6 +195,16 @@ def test_stops_by_reason() -> None:
         ("NO_SAFE_SIDE", 1, 11.0),
         ("STALE_EVIDENCE", 2, 2.0),
     ]
+
+
+def test_a_boat_that_is_kept_on_station_counts_as_stopped_by_its_advice() -> None:
+    history = DriveHistory()
+    going = m.NavCommand(source_us=1, enable=True, heading_rad=0.0, speed_mps=0.5)
+    keeping = msgspec.structs.replace(going, speed_mps=0.0, vetoes=(m.Inhibit.ADVISED_STOP,), keeps_station=True)
+    advisory = m.Advisory(source_us=1, direction=m.Direction.STOP, reason=m.Reason.NO_SAFE_SIDE)
+    for t_s, order in ((1.0, going), (2.0, keeping), (4.0, keeping), (5.0, going)):
+        history.record_order(t_s, order, advisory)
+    assert history.stops == [StopInterval(2.0, "NO_SAFE_SIDE", 5.0)]
 
 
 def test_latency_is_of_the_first_thrust_of_each_picture() -> None:

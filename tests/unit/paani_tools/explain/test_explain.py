@@ -164,8 +164,22 @@ def test_lanes_carry_their_numbers_and_thresholds(capsys: pytest.CaptureFixture[
     assert "steer " in out
 
 
-def test_a_boat_that_is_held_says_why(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    held = {"enable": False, "inhibits": (m.Inhibit.NOT_ARMED, m.Inhibit.NO_CLOCK)}
+@pytest.mark.parametrize(
+    ("held", "text"),
+    [
+        (
+            {"enable": False, "inhibits": (m.Inhibit.NOT_ARMED, m.Inhibit.NO_CLOCK)},
+            "holds the boat: not armed, no clock",
+        ),
+        (
+            {"speed_mps": 0.0, "vetoes": (m.Inhibit.ADVISED_STOP,), "keeps_station": True},
+            "keeps the boat where it is: advised stop",
+        ),
+    ],
+)
+def test_a_boat_that_is_held_says_why(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, held: dict[str, object], text: str
+) -> None:
     stopped = []
     for record in DRIVE:
         data = record.data
@@ -178,7 +192,7 @@ def test_a_boat_that_is_held_says_why(capsys: pytest.CaptureFixture[str], tmp_pa
     )
     stopped.append(Record(keys.THRUST_APPLIED.name, T0_US + 8_500_000, 0, msgspec.json.encode(applied)))
     _, out, _ = paani(capsys, "explain", write_log(tmp_path / "a.mcap", stopped), "--at", "8")
-    assert "holds the boat: not armed, no clock" in out
+    assert text in out
     assert "applies zero: pulse lost (eye)" in out
 
 
