@@ -44,6 +44,7 @@ from paani_services.navigator.guidance.mission_progress import (
     describe_leg,
 )
 from paani_services.navigator.guidance.passed_obstacles import PassedObstacles, limit_course_rad, remember_obstacles
+from paani_services.navigator.guidance.station_keeping import drift_heading_rad, may_keep_station
 from paani_services.navigator.guidance.visual_turns import (
     TURN_DIRECTIONS,
     TURN_SIDE,
@@ -148,7 +149,14 @@ def navigate(
         state = hold_cross_track(state, now_us)
         keeps_station = is_planned and config.keep_station and may_keep_station(inhibits, advisory)
         return state, build_command(
-            state, inputs, now_us, inhibits, odometry.yaw_rad, keeps_station=keeps_station, cross_m=cross_m, leg=leg
+            state,
+            inputs,
+            now_us,
+            inhibits,
+            drift_heading_rad(odometry),
+            keeps_station=keeps_station,
+            cross_m=cross_m,
+            leg=leg,
         )
     heading_rad, limit_mps = setpoint.course_rad, speed_limit_mps(advisory)
     speed_mps = min(setpoint.speed_mps, limit_mps)
@@ -202,11 +210,6 @@ def begin_step(
         planner_state = observe(state.planner_state, inputs.odometry, inputs.evidence, config.planner, inputs.tracks)
         state = msgspec.structs.replace(state, planner_state=planner_state)
     return state, inhibits
-
-
-def may_keep_station(inhibits: list[Inhibit], advisory: Advisory | None) -> bool:
-    """Whether nothing but the advice forbids motion, and the advice allows thrust that holds the boat where it is."""
-    return inhibits == [Inhibit.ADVISED_STOP] and advisory is not None and advisory.may_keep_station is True
 
 
 def _advance_mission(

@@ -53,7 +53,7 @@ class NavCommand(Message, frozen=True, kw_only=True):
     `obstacle_track_ids`: the advisor's tracks of the dynamic obstacles that the plan in force was made for.
     `astern_mps`: the speed astern that a hand asks for, only where `speed_mps` is 0. `vetoes`: why a hand gets no
     thrust ahead, while it may turn and go astern. `keeps_station`: the advice stops the boat, which `vetoes` names, and
-    thrust may only work against the way that it makes; both speeds are 0.
+    thrust may only work against the way that it makes; both speeds are 0, the heading is that of the drift.
     """
 
     enable: bool

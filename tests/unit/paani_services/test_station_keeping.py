@@ -80,6 +80,22 @@ def test_an_order_that_keeps_the_station_asks_for_no_speed_and_names_its_veto() 
     assert (order.vetoes, order.direction) == ((Inhibit.ADVISED_STOP,), Direction.STOP)
 
 
+@given(st.floats(-math.pi, math.pi), st.floats(-0.6, 0.6), st.floats(-0.6, 0.6))
+def test_the_bow_is_turned_to_where_the_boat_drifts_and_a_boat_at_rest_is_not_turned(
+    yaw_rad: float, surge_mps: float, sway_mps: float
+) -> None:
+    adrift = msgspec.structs.replace(pose(3.0, 0.0, yaw_rad), surge_mps=surge_mps, sway_mps=sway_mps)
+    resting = msgspec.structs.replace(adrift, stopped=True)
+    along, rests = (
+        navigate(RUNNING, inputs(advisory=STOPPED, odometry=each), MISSION, NOW_US, 43, NAVIGATOR, CAMERA)[1]
+        for each in (adrift, resting)
+    )
+    off_rad = along.heading_rad - yaw_rad
+    assert math.sin(off_rad) * surge_mps == pytest.approx(math.cos(off_rad) * sway_mps, abs=1e-9)
+    assert math.cos(off_rad) * surge_mps + math.sin(off_rad) * sway_mps >= 0.0
+    assert rests.heading_rad == pytest.approx(yaw_rad)
+
+
 @pytest.mark.parametrize(
     "changes",
     [
