@@ -117,7 +117,7 @@ CASES: list[tuple[dict[str, m.Message | None], tuple[str, ...], list[str]]] = [
     # Thrust that works against the drift alone is no way on.
     ({"navigator/command": replace(ORDER, speed_mps=0.0, direction=m.Direction.STOP, keeps_station=True,
       vetoes=(m.Inhibit.ADVISED_STOP,)), "advisor/advisory": STOP_ADVISED}, (),
-     ["KEEPING_STATION", "STANDING, KEEPING STATION", "the advisor advises STOP: no safe side"]),
+     ["KEEPING_STATION", "KEEPING STATION", "the advisor advises STOP: no safe side"]),
     # Advice that has changed since the order is not said to be why.
     (still(NOT_ENABLED, m.Inhibit.ADVISED_STOP), (), ["STANDING", "STANDING STILL", "the advisor advises STOP"]),
     (still(NOT_ARMED, m.Inhibit.NOT_ARMED), (), ["NOT_ARMED", "NOT ARMED", "nothing else keeps the boat still"]),
