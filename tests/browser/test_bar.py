@@ -111,7 +111,7 @@ CASES: list[tuple[dict[str, m.Message | None], tuple[str, ...], list[str]]] = [
     (still(NOT_ENABLED, m.Inhibit.HOLDING, leg="hold station"), (), ["HOLDING", "HOLDING", "hold station"]),
     (still(NOT_ENABLED, m.Inhibit.ROUTE_FINISHED), (), ["DONE", "MISSION DONE", "route finished"]),
     (still(NOT_ENABLED, m.Inhibit.HOLDING, m.Inhibit.OUTSIDE_FENCE), (),
-     ["STANDING", "STANDING STILL", "outside the fence, or too close to it"]),
+     ["STANDING", "STANDING STILL", "outside the fence or on land, or too close to its edge"]),
     (still(NOT_ENABLED, m.Inhibit.ADVISED_STOP) | {"advisor/advisory": STOP_ADVISED}, (),
      ["STANDING", "STANDING STILL", "the advisor advises STOP: no safe side"]),
     # Thrust that works against the drift alone is no way on.
