@@ -80,7 +80,7 @@ export const LOG_TEXTS = { title: PAGE_TEXTS.log, label: "Log, newest first", pa
 export const MOTION_TEXTS = {
   title: PAGE_TEXTS.motion, inhibits: "Why it does not move", left: "Port", right: "Starboard",
   applied: "thrust applied", zero: "zero thrust", silent: "no data from the thrust adapter", clear: "Nothing inhibits thrust",
-  setSpeed: "Set speed", setHeading: "Set heading", crossTrack: "Cross-track", age: "Command age", plannedFor: "Planned for", battery: "Battery",
+  setSpeed: "Set speed", setHeading: "Set heading", crossTrack: "Cross-track", age: "Command age", battery: "Battery",
 };
 
 /** What the operator ordered last, and what became of it. */

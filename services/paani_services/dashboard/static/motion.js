@@ -6,7 +6,7 @@ import { isThrustApplied } from "./inhibits.js";
 import { sensorStrip } from "./sensors.js";
 import { inhibits } from "./stages.js";
 import { facts, html, moment, mount } from "./templates.js";
-import { MOTION_TEXTS, STAGES, fixed, headingDeg, sentence, trackNames } from "./text.js";
+import { MOTION_TEXTS, STAGES, fixed, headingDeg, sentence } from "./text.js";
 
 const FULL_SCALE = 0.25; // of full thrust, drawn as a full bar; the controller commands less in normal driving
 
@@ -35,14 +35,12 @@ const fan = (side, applied) => html`<div class="fan"><span>${MOTION_TEXTS[side]}
 function orderOf({ store, now }, applied) {
   const command = store.get("navigator/command");
   const lagMs = applied?.command_source_us ? (applied.sent_us - applied.command_source_us) / 1000 : NaN;
-  const planned = command?.obstacle_track_ids ?? [], tracks = store.get("advisor/tracks")?.tracks ?? [];
   return [
     [MOTION_TEXTS.setSpeed, command ? `${fixed(command.speed_mps)} m/s` : "–"],
     [MOTION_TEXTS.setHeading, command ? `${fixed(headingDeg(command.heading_rad), 0)}°` : "–"],
     [MOTION_TEXTS.crossTrack, command ? `${fixed(command.cross_track_m, 1)} m` : "–"],
     [MOTION_TEXTS.age, Number.isFinite(lagMs) ? `${fixed(lagMs, 0)} ms` : "–"],
     ...findPower(store, now),
-    ...(planned.length ? [/** @type {[string, string]} */ ([MOTION_TEXTS.plannedFor, trackNames(tracks, planned)])] : []),
   ];
 }
 
