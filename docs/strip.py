@@ -7,6 +7,7 @@ Arm, route, swimmer ahead, why, stop, and back to a past moment; PAGE is the swi
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import sys
 import tempfile
 from pathlib import Path
@@ -30,8 +31,12 @@ COLUMNS, CELL_PX, BAND_PX, GAP_PX = 2, (960, 600), 44, 12
 GROUND, INK = (250, 247, 244), (60, 45, 30)  # BGR
 SWIMMER_S, PERIOD_S = 180.0, 0.2
 UNDER_WAY_S, HOLD_S = 5.0, 1.6
+PREDICTED_S, REFUSED_S = 1.2, 15.0
 PAGE_FRAME = 2  # of the strip's
+TRIES = 30  # to have a picture and the advice on it in one
 SWIMMER_AHEAD = "/swimmer|person/i.test(document.querySelector('#explanation').innerText)"
+JUDGED = "paani.overlay.advisory_seq"  # of the picture that is shown, once the advice on it has come
+OBSTACLE_REFUSES = "/person|obstacle/.test(document.querySelector('#heading-legend').innerText)"
 
 
 async def take_frames(plan: Plan) -> list[tuple[str, bytes]]:
@@ -54,9 +59,13 @@ async def take_frames(plan: Plan) -> list[tuple[str, bytes]]:
             await asyncio.sleep(UNDER_WAY_S)
             await _take("Armed: it follows its route", page)
             await _until(page, SWIMMER_AHEAD)
+            await asyncio.sleep(PREDICTED_S)
+            await _until(page, SWIMMER_AHEAD)
             await _take("A swimmer ahead: how fast, and on which side", page)
             await page.click("#map-headings")
             await asyncio.sleep(1.5)
+            with contextlib.suppress(TimeoutError):  # where it keeps so far off that nothing else is refused
+                await _until(page, OBSTACLE_REFUSES, REFUSED_S)
             await _take("Why this heading: each other one, and what refused it", page)
             await page.click("#stop")
             await asyncio.sleep(2.0)
@@ -68,14 +77,19 @@ async def take_frames(plan: Plan) -> list[tuple[str, bytes]]:
             await browser.close()
 
     async def _take(caption: str, page: Any) -> None:
-        frames.append((caption, await page.screenshot()))
+        picture = b""
+        for _ in range(TRIES):
+            judged, picture = await page.evaluate(JUDGED), await page.screenshot()
+            if judged is not None and judged == await page.evaluate(JUDGED):
+                break
+        frames.append((caption, picture))
 
     await run_plan(plan, None, Display(sys.stdout), drive)
     return frames
 
 
-async def _until(page: Any, condition: str) -> None:
-    async with asyncio.timeout(SWIMMER_S):
+async def _until(page: Any, condition: str, limit_s: float = SWIMMER_S) -> None:
+    async with asyncio.timeout(limit_s):
         while not await page.evaluate(condition):  # noqa: ASYNC110  # a browser wakes nobody
             await asyncio.sleep(PERIOD_S)
 

@@ -7,7 +7,7 @@ import { CAMERA_TEXTS, ageText, byId, screenScale, setText, words } from "./text
 
 const OPACITY_KEY = "paani-overlay-opacity";
 /** @type {{frame_seq: number | null, picture_seq: number | null, mask_seq: number | null, evidence_seq: number | null}} */
-const NOTHING = { frame_seq: null, picture_seq: null, mask_seq: null, evidence_seq: null };
+const NOTHING = { frame_seq: null, picture_seq: null, mask_seq: null, evidence_seq: null, advisory_seq: null };
 
 /** @type {[number, number][]} */
 const NO_HULL = [];
@@ -110,6 +110,7 @@ export class Camera {
       picture_seq: header.frame_seq,
       mask_seq: mask ? header.frame_seq : null,
       evidence_seq: evidence ? evidence.frame_seq : null,
+      advisory_seq: advisory ? advisory.frame_seq : null,
     };
   }
 
