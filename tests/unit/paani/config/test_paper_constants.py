@@ -67,6 +67,7 @@ CONSTANTS: tuple[tuple[str, str, object], ...] = (
     ("M4", "navigator.crab_gain_mps", 0.0),
     ("M5", "navigator.turn_deg", 25.0),
     ("M5", "navigator.latch_turns", False),
+    ("M8", "navigator.keep_station", False),
     ("M6", "navigator.slight_turn_deg", 10.0),
     ("M7", "navigator.cruise_mps", 0.15),
     ("M7", "navigator.turn_speed_frac", 0.5),
