@@ -43,7 +43,7 @@ BESIDE = {f"tests/{folder}/test_{name}.py" for folder, names in RESULTS_ALONE.it
 SOAK = "tests/bench/test_soak.py"
 STOPS_THE_BOAT = {"fault", "link"}  # folders
 WORKER = "PYTEST_XDIST_WORKER" in os.environ  # other tests run at the same time
-NICENESS = 10  # a ninth of the share of a process that watches the clock
+NICENESS = 5
 MAX_REASON_CHARACTERS = 300
 
 settings.register_profile("quick", max_examples=15, deadline=None)  # for `make check`; everything else tries more
