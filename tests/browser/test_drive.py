@@ -160,6 +160,7 @@ async def test_a_hand_on_the_page_drives_while_it_holds_and_the_wheel_is_taken_o
         await other.set_viewport_size({"width": 360, "height": 740})
         await other.wait_for_timeout(300)
         assert await other.evaluate(SIDEWAYS) == [], "the button is whole on a phone"
+        assert await other.evaluate(IS_WHEEL_WHOLE)
         await other.click("#drive-take")
         await orders.until(lambda found: found.mode is DriveMode.IDLE)
         await until(page, "document.querySelector('#drive').dataset.driving === 'false'")
