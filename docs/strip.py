@@ -35,7 +35,7 @@ PREDICTED_S, REFUSED_S = 1.2, 15.0
 PAGE_FRAME = 2  # of the strip's
 TRIES = 30  # to have a picture and the advice on it in one
 SWIMMER_AHEAD = "/swimmer|person/i.test(document.querySelector('#explanation').innerText)"
-JUDGED = "paani.overlay.advisory_seq"  # of the picture that is shown, once the advice on it has come
+JUDGED = "paani.overlay.advisory_seq"  # of the picture on the page, once the advice on it has come
 OBSTACLE_REFUSES = "/person|obstacle/.test(document.querySelector('#heading-legend').innerText)"
 
 

@@ -38,6 +38,11 @@ def mission_of_route(route: Route) -> Mission:
     return Mission(source_us=route.source_us, name=route.name, legs=(leg,))
 
 
+def count_corners(bounds: Fence) -> int:
+    """Of all areas together."""
+    return sum(len(area.corners) for area in bounds)
+
+
 def find_mission_fault(
     legs: tuple[MissionLeg, ...], fence: Fence, margin_m: float, rally: tuple[Waypoint, ...] = (), land: Fence = ()
 ) -> str:
@@ -51,7 +56,7 @@ def find_mission_fault(
 
 def find_rally_fault(rally: tuple[Waypoint, ...], fence: Fence, margin_m: float, land: Fence = ()) -> str:
     """What is wrong with the first rally point that cannot be returned to; empty where nothing is."""
-    corners_n = _count_corners((*fence, *land))
+    corners_n = count_corners((*fence, *land))
     if len(rally) > MAX_RALLY:
         return f"rally: has {len(rally)}, more than {MAX_RALLY}"
     if len(rally) * corners_n > MAX_RALLY_PAIRS:
@@ -119,20 +124,16 @@ def _find_beyond(
     return found
 
 
-def _count_corners(bounds: Fence) -> int:
-    return sum(len(area.corners) for area in bounds)
-
-
 def _find_size_fault(legs: tuple[MissionLeg, ...], bounds: Fence) -> str:
-    waypoints_n, corners_n = sum(len(leg.waypoints) for leg in legs), _count_corners(bounds)
+    waypoints_n, corners_n = sum(len(leg.waypoints) for leg in legs), count_corners(bounds)
     if waypoints_n * corners_n > MAX_PAIRS:
         return f"legs: {waypoints_n} waypoints times {corners_n} corners of the fence is more than {MAX_PAIRS}"
     return ""
 
 
 def _find_fence_fault(fence: Fence, land: Fence) -> str:
-    if _count_corners((*fence, *land)) > MAX_CORNERS:
-        return f"fence: more than {MAX_CORNERS} corners{f', {_count_corners(land)} of them of land' if land else ''}"
+    if count_corners((*fence, *land)) > MAX_CORNERS:
+        return f"fence: more than {MAX_CORNERS} corners{f', {count_corners(land)} of them of land' if land else ''}"
     for number, area in enumerate(fence):
         at = f"areas[{number}]"
         fault = _find_point_fault(area.corners, f"{at}.corners")

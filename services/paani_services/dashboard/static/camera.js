@@ -6,7 +6,7 @@ import { drawBoxes, drawCorridors, drawCorridorTop, drawMask, drawOwnHull } from
 import { CAMERA_TEXTS, ageText, byId, screenScale, setText, words } from "./text.js";
 
 const OPACITY_KEY = "paani-overlay-opacity";
-/** @type {{frame_seq: number | null, picture_seq: number | null, mask_seq: number | null, evidence_seq: number | null}} */
+/** @type {{frame_seq: number | null, picture_seq: number | null, mask_seq: number | null, evidence_seq: number | null, advisory_seq: number | null}} */
 const NOTHING = { frame_seq: null, picture_seq: null, mask_seq: null, evidence_seq: null, advisory_seq: null };
 
 /** @type {[number, number][]} */

@@ -4,7 +4,7 @@
 // a turn too tight for the hull, and cells in which the boat has seen something. Pure.
 
 import { FAULT_TEXTS } from "./text.js";
-import { between, clearance, contains, crossing, distance, isAllowed, segments } from "./plane_geometry.js";
+import { between, clearance, crossing, distance, isAllowed, segments } from "./plane_geometry.js";
 
 const STEP_M = 0.5, MAX_STEPS = 400; // along a segment
 const MAX_TESTS = 2e6; // of a place against an edge: of a large mission fewer places are tried, so that the page answers
@@ -82,14 +82,11 @@ function legMarks(leg, name, plan, limits, cells) {
   ways.forEach(([a, b], index) => {
     const where = `${name}, ${FAULT_TEXTS.waypoint} ${index + 1}`;
     if (isLine && distance(a, b) < SAME_M) found.push({ at: a, text: `${where}: ${FAULT_TEXTS.sameWaypoint}` });
-    const outside = firstAlong(a, b, most, (at) => !isAllowed(plan.fence, at));
-    if (outside) found.push({ at: outside, text: `${where}: ${FAULT_TEXTS.outside}` });
-    const near = outside ? null : firstAlong(a, b, most, (at) => clearance(plan.fence, at) < limits.marginM);
-    if (near) found.push({ at: near, text: `${where}: ${FAULT_TEXTS.near(limits.marginM)}` });
-    const onLand = firstAlong(a, b, most, (at) => land.some((area) => contains(area, at)));
-    if (onLand) found.push({ at: onLand, text: `${where}: ${FAULT_TEXTS.land}` });
-    const nearLand = onLand ? null : firstAlong(a, b, most, (at) => clearance(land, at) < limits.marginM);
-    if (nearLand) found.push({ at: nearLand, text: `${where}: ${FAULT_TEXTS.nearLand(limits.marginM)}` });
+    for (const { areas, beyond, near } of [{ areas: plan.fence, beyond: FAULT_TEXTS.outside, near: FAULT_TEXTS.near }, { areas: land, beyond: FAULT_TEXTS.land, near: FAULT_TEXTS.nearLand }]) {
+      const outside = firstAlong(a, b, most, (at) => !isAllowed(areas, at)), tooNear = outside ? null : firstAlong(a, b, most, (at) => clearance(areas, at) < limits.marginM);
+      if (outside) found.push({ at: outside, text: `${where}: ${beyond}` });
+      if (tooNear) found.push({ at: tooNear, text: `${where}: ${near(limits.marginM)}` });
+    }
     const seen = cells && firstAlong(a, b, most, (at) => isOccupied(cells, at));
     if (seen) found.push({ at: seen, text: `${where}: ${FAULT_TEXTS.occupied}` });
   });

@@ -10,7 +10,7 @@ import msgspec
 from paani.config.section import Section
 from paani.errors import UserError
 from paani.messages import FenceArea, Keep
-from paani.missions import MAX_CORNERS, find_polygon_fault
+from paani.missions import MAX_CORNERS, count_corners, find_polygon_fault
 from paani.undecodable import UNDECODABLE
 from paani_services.navigator.files.bounded_reading import read_toml
 from paani_services.navigator.files.geojson import (
@@ -71,7 +71,7 @@ def build_areas(rows: list[AreaRow], frame: MapFrame) -> tuple[FenceArea, ...]:
         )
         for keep, points, name, at in rows
     )
-    if sum(len(area.corners) for area in areas) > MAX_CORNERS:
+    if count_corners(areas) > MAX_CORNERS:
         raise UserError(f"{where}: more than {MAX_CORNERS} corners")
     for area, (_, _, _, at) in zip(areas, rows, strict=True):
         fault = find_polygon_fault(area)

@@ -19,6 +19,7 @@ from paani.missions import (
     MAX_RALLY,
     MAX_WAYPOINTS,
     MIN_RADIUS_M,
+    count_corners,
     find_home_fault,
     find_leg_outside,
     find_rally_fault,
@@ -108,7 +109,7 @@ def _require_within(
     mission: Mission, fence: tuple[FenceArea, ...], land: tuple[FenceArea, ...], config: NavigatorConfig, where: str
 ) -> None:
     """Raises UserError for a waypoint, home or rally point that fence or land forbid, and for too many corners."""
-    if sum(len(area.corners) for area in (*fence, *land)) > MAX_CORNERS:
+    if count_corners((*fence, *land)) > MAX_CORNERS:
         raise UserError(f"navigator.fence {config.fence}: more than {MAX_CORNERS} corners with those of navigator.land")
     margin_m = config.fence_margin_m
     found = find_leg_outside(mission.legs, fence, margin_m, land)

@@ -56,11 +56,11 @@ def test_motion_and_why_not() -> None:
     status = report(diagnostics)["motion"]
     assert (status.level, status.message) == (WARN, "no thrust: not_armed")
     assert values(status)["inhibits"] == "NOT_ARMED, ADVISED_STOP"
+    assert values(status)["stopped"] == "True"
     vetoes = (m.Inhibit.ADVISED_STOP,)
     keeping = msgspec.structs.replace(order, enable=True, inhibits=(), vetoes=vetoes, keeps_station=True)
     diagnostics.note(keys.COMMAND.name, keeping, NOW_US)
     assert values(report(diagnostics)["motion"])["inhibits"] == "ADVISED_STOP"
-    assert values(status)["stopped"] == "True"
 
 
 def test_silence_is_stale_after_the_time_of_the_table() -> None:
