@@ -87,6 +87,12 @@ def test_the_paper_runs_two_threads_within_a_step_and_one_between_c14_d11() -> N
         assert (options.intra_op_num_threads, options.inter_op_num_threads) == (2, 1)
 
 
+def test_all_networks_of_a_process_take_memory_from_one_arena() -> None:
+    for role in ("detector", "segmenter", "gate"):
+        options = OnnxEngine.load(role, "", 1)._session.get_session_options()
+        assert options.get_session_config_entry("session.use_env_allocators") == "1"
+
+
 @pytest.mark.parametrize(
     ("words", "named"),
     [

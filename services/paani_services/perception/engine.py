@@ -3,6 +3,7 @@
 This is the only file of the services that imports onnxruntime, and it does so only when a model is loaded.
 """
 
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, Protocol, Self
 
@@ -74,6 +75,20 @@ def check_onnxruntime(release: str) -> None:
         )
 
 
+@cache
+def share_arena() -> None:
+    """Give all models of this process one arena for what they compute with, that grows by what is asked of it alone.
+
+    With it perception holds 140 MiB; it holds 151 with an arena for each model, and 150 to 166 with the C library's
+    heap, where gaps stay between what lasts. All take the same time.
+    """
+    import onnxruntime as ort  # noqa: PLC0415 - as in `OnnxEngine.load`
+
+    of_cpu = ort.OrtMemoryInfo("Cpu", ort.OrtAllocatorType.ORT_ARENA_ALLOCATOR, 0, ort.OrtMemType.DEFAULT)
+    default, as_requested = -1, 1
+    ort.create_and_register_allocator(of_cpu, ort.OrtArenaCfg(0, as_requested, default, default))
+
+
 class OnnxEngine:
     """Runs an ONNX file by onnxruntime."""
 
@@ -98,7 +113,9 @@ class OnnxEngine:
         options.add_session_config_entry("session.intra_op.allow_spinning", "1" if spinning else "0")
         options.add_session_config_entry("session.model_external_initializers_file_folder_path", str(file.parent))
         options.log_severity_level = 3
-        options.enable_cpu_mem_arena = options.enable_mem_pattern = False  # 30 MiB less, in the same time
+        options.enable_mem_pattern = False  # 8 MiB less, in the same time
+        share_arena()
+        options.add_session_config_entry("session.use_env_allocators", "1")
 
         def open_session(model: str | bytes) -> Any:
             try:

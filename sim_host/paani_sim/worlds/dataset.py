@@ -25,10 +25,11 @@ from paani_sim.eye.renderer import Eye
 from paani_sim.eye.scatter import random_pose, scatter
 from paani_sim.eye.sky import SKIES
 from paani_sim.worlds import FIXED_WORLDS, load_world
-from paani_sim.worlds.world import Light, Wind, World
+from paani_sim.worlds.world import Kind, Light, Obstacle, Wind, World
 
 PICTURES_PER_SESSION = 24
 PICTURES_PER_SKY = 4
+DESERTED_EVERY = 3  # of so many sessions one shows nobody: what stands on a bank without people is told from people
 FOG_FRAC, RAIN_FRAC = 0.12, 0.15  # of the skies
 SUN_AHEAD_FRAC, AHEAD_RAD = 0.2, 0.4  # of the skies: the sun before the camera, and glints on the water below it
 LENS_FRAC = 0.35  # of the pictures come through a lens that bends
@@ -137,6 +138,9 @@ def draw_session(session: Session) -> DrawnSession:
     """Draw the pictures of one session. Raises UserError for missing OpenGL."""
     rng = np.random.default_rng([session.seed, session.number])
     world = _vary_world(load_world(session.world), rng)
+    deserted = session.number % DESERTED_EVERY == DESERTED_EVERY - 1
+    if deserted:
+        world = dataclasses.replace(world, obstacles=_without_people(world.obstacles))
     seq = f"{world.name}_{session.seed}_{session.number:03d}"
     height = round(session.height_px * FLATTER) if rng.random() < FLAT_FRAC else session.height_px
     files: dict[str, bytes] = {}
@@ -144,7 +148,7 @@ def draw_session(session: Session) -> DrawnSession:
     boxes: collections.Counter[str] = collections.Counter()
     with Eye(world, Camera(width_px=session.width_px, height_px=height), supersample=2) as eye:
         for k in range(session.pictures):
-            view = _render_picture(eye, k, rng)
+            view = _render_picture(eye, k, rng, deserted=deserted)
             items.append(_encode_picture(files, seq, k, view, rng))
             boxes.update(str(box.kind) for box in view.boxes)
     return DrawnSession(files, tuple(items), dict(boxes))
@@ -172,8 +176,8 @@ def _vary_world(world: World, rng: np.random.Generator) -> World:
     )
 
 
-def _render_picture(eye: Eye, k: int, rng: np.random.Generator) -> Labelled:
-    """One picture with its own pose, camera and things, and now and then another sky."""
+def _render_picture(eye: Eye, k: int, rng: np.random.Generator, *, deserted: bool) -> Labelled:
+    """One picture with its own pose, camera and things, and now and then another sky. deserted: with nobody in it."""
     pose = dataclasses.replace(random_pose(eye.world, rng), yaw_rate_radps=float(rng.normal(0.0, 0.25)))
     if k % PICTURES_PER_SKY == 0:
         light = Light(
@@ -203,9 +207,15 @@ def _render_picture(eye: Eye, k: int, rng: np.random.Generator) -> Labelled:
         k1=float(bend * rng.uniform(-0.10, 0.03)) if rng.random() < LENS_FRAC else 0.0,
         shutter_s=float(rng.uniform(0.0, 0.03)),
     )
-    eye.place_obstacles(scatter(eye.world, pose, rng))
+    things = scatter(eye.world, pose, rng)
+    eye.place_obstacles(_without_people(things) if deserted else things)
     view = eye.render_labelled(pose, float(rng.uniform(0.0, 600.0)))
     return dataclasses.replace(view, boxes=select_visible_boxes(view))
+
+
+def _without_people(things: Sequence[Obstacle]) -> tuple[Obstacle, ...]:
+    """Leave out whoever stands, walks, sits or swims; boats keep their crews."""
+    return tuple(thing for thing in things if thing.kind is not Kind.PERSON)
 
 
 def _encode_picture(files: dict[str, bytes], seq: str, k: int, view: Labelled, rng: np.random.Generator) -> Item:

@@ -27,7 +27,7 @@ from paani_sim.worlds import (
     actor_pose_along,
     load_world,
 )
-from paani_sim.worlds.dataset import Manifest, write_dataset
+from paani_sim.worlds.dataset import DESERTED_EVERY, Manifest, Session, draw_session, write_dataset
 
 pytestmark = [pytest.mark.gl, pytest.mark.timeout(120)]
 
@@ -322,3 +322,16 @@ def test_dataset_has_the_form_of_the_sources(tmp_path: Path) -> None:
     again = tmp_path / "again"
     write_dataset(again, 5, seed=3, worlds=("river",))
     assert [(again / i.file).read_bytes() for i in stored.items] == [(out / i.file).read_bytes() for i in stored.items]
+
+
+@pytest.mark.parametrize("world", ["river", "canal"])
+def test_every_third_session_of_a_dataset_shows_nobody_but_crews(world: str) -> None:
+    """Banks, boats and buoys as in the others, so that a detector learns what stands on a bank and is no person."""
+    _require_gl()
+    sessions = [
+        Session(number=number, pictures=4, seed=11, world=world, width_px=320, height_px=240)
+        for number in range(DESERTED_EVERY)
+    ]
+    *peopled, deserted = [draw_session(session).boxes for session in sessions]
+    assert 5 * deserted.get("person", 0) < min(boxes.get("person", 0) for boxes in peopled)
+    assert sum(deserted.values()) > 5
