@@ -1,4 +1,4 @@
-"""Conditions of a world that can be set to a value, whatever a seed draws: to find where drives begin to fail. Pure."""
+"""Conditions that can be set to a value, whatever a seed draws: to find where drives begin to fail. Pure."""
 
 from __future__ import annotations
 
@@ -9,17 +9,18 @@ from typing import Any, NamedTuple
 
 from paani.errors import UserError
 from paani_sim.worlds import World
+from paani_sim.worlds.generate import AS_DRAWN, Traffic
 
 VALUE_SEPARATOR = "="
 MOST_VALUES = 20  # of one sweep
 
 
 class Condition(NamedTuple):
-    """The values that a condition may have, as in a scenario file, and how a world gets one."""
+    """The values that a condition may have, as in a scenario file, and how a world gets one; None for what is met."""
 
     least: float
     most: float
-    apply: Callable[[World, float], World]
+    apply: Callable[[World, float], World] | None
 
 
 def _part(part: str, name: str, factor: float = 1.0) -> Callable[[World, float], World]:
@@ -37,6 +38,7 @@ CONDITIONS = {
     "rain_mmph": Condition(0.0, 100.0, _part("light", "rain_mmph")),
     "sun_elevation_deg": Condition(0.0, 90.0, _part("light", "sun_elevation_rad", math.pi / 180.0)),
 }
+TRAFFIC = {"encounters": Condition(1, 6, None), "people_factor": Condition(1, 4, None)}  # whole numbers
 
 
 def parse_sweep(text: str) -> tuple[str, ...]:
@@ -54,19 +56,31 @@ def parse_sweep(text: str) -> tuple[str, ...]:
 def parse_setting(text: str) -> tuple[str, float]:
     """The condition and the value of `NAME=V`. Raises UserError."""
     name, _, given = text.partition(VALUE_SEPARATOR)
-    if name not in CONDITIONS:
-        raise UserError(f"--sweep {text}: no condition '{name}' (have: {', '.join(CONDITIONS)})")
-    condition = CONDITIONS[name]
+    known = CONDITIONS | TRAFFIC
+    if name not in known:
+        raise UserError(f"--sweep {text}: no condition '{name}' (have: {', '.join(known)})")
+    condition = known[name]
     try:
         value = float(given)
     except ValueError:
         raise UserError(f"--sweep {text}: '{given}' is no number") from None
     if not condition.least <= value <= condition.most:
         raise UserError(f"--sweep {text}: {name} is {condition.least:g} to {condition.most:g}")
+    if condition.apply is None and not value.is_integer():
+        raise UserError(f"--sweep {text}: {name} is a whole number")
     return name, value
 
 
 def with_condition(world: World, text: str) -> World:
-    """The world with the condition of `NAME=V`. Raises UserError."""
+    """The world with the condition of `NAME=V`; as it is where that is of what is met. Raises UserError."""
     name, value = parse_setting(text)
-    return CONDITIONS[name].apply(world, value)
+    apply = CONDITIONS[name].apply if name in CONDITIONS else None
+    return world if apply is None else apply(world, value)
+
+
+def traffic_of(text: str) -> Traffic:
+    """What is to be met by `NAME=V`; as drawn where that is of the world, or empty. Raises UserError."""
+    if not text:
+        return AS_DRAWN
+    name, value = parse_setting(text)
+    return AS_DRAWN._replace(**{name: int(value)}) if name in TRAFFIC else AS_DRAWN

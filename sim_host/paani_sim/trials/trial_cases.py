@@ -11,11 +11,11 @@ import msgspec
 import numpy as np
 
 from paani.errors import UserError
-from paani_sim.trials.conditions import parse_setting, with_condition
+from paani_sim.trials.conditions import traffic_of, with_condition
 from paani_sim.trials.policies import Policy
 from paani_sim.trials.seed_parts import SeedChoice, list_seeds
 from paani_sim.worlds import WORLDS, Fault, FaultKind, Scenario
-from paani_sim.worlds.generate import draw_random_scenario
+from paani_sim.worlds.generate import AS_DRAWN, draw_random_scenario
 from paani_sim.worlds.imazu import IMAZU_SCENARIOS
 from paani_sim.worlds.load import SCENARIOS, load_scenario
 
@@ -107,7 +107,11 @@ def list_cases(
     """Every case of a suite, in the order of driving. A choice that says which or how many seeds holds for PAPER too.
 
     Without one the seeds are the first development seeds. swept: each drive under each of these, and none with a fault.
+    Raises UserError for a condition that a world cannot have.
     """
+    for world in worlds:
+        for condition in swept:
+            _require_sweepable(world, condition)
     choice = choice or SeedChoice()
     seeds, chosen = list_seeds(choice, suite.seed_count), tuple(policies)
     every = {Policy.PAPER: 1 if choice.span or choice.count else suite.paper_seed_stride}
@@ -145,9 +149,14 @@ def parse_case(text: str) -> TrialCase:
         raise UserError(f"--one {text}: no policy '{policy}' (have: {', '.join(Policy)})")
     if not seed.isdecimal():
         raise UserError(f"--one {text}: '{seed}' is no seed")
-    if swept:
-        parse_setting(swept)
+    _require_sweepable(world, swept)
     return TrialCase(world, int(seed), Policy(policy), fault, swept)
+
+
+def _require_sweepable(world: str, swept: str) -> None:
+    """Raises UserError for a condition that is none, or that says what is met in a scenario where that is written."""
+    if traffic_of(swept) != AS_DRAWN and is_fixed_scenario(world):
+        raise UserError(f"--sweep {swept}: {world} says itself what is met")
 
 
 def build_scenario(case: TrialCase) -> Scenario:
@@ -155,7 +164,7 @@ def build_scenario(case: TrialCase) -> Scenario:
     if is_fixed_scenario(case.world):
         scenario = dataclasses.replace(load_scenario(case.world), seed=case.seed)
     else:
-        scenario = draw_random_scenario(case.world, case.seed)
+        scenario = draw_random_scenario(case.world, case.seed, traffic_of(case.swept))
     if case.swept:
         scenario = dataclasses.replace(scenario, world=with_condition(scenario.world, case.swept))
     if not case.fault:

@@ -4,6 +4,7 @@ import dataclasses
 import math
 import zlib
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -43,11 +44,23 @@ MOORED = ("rowboat", "dinghy", "cruiser", "workboat", "sailboat", "barge")
 UNDER_WAY = ("dinghy", "kayak", "cruiser", "workboat")
 ADRIFT = ("rowboat", "dinghy", "kayak")
 
+
+class Traffic(NamedTuple):
+    """What is met on a drawn route. encounters: how many are wanted, None for 1 to 4 as the seed draws.
+
+    people_factor: how many times as often as else it is a swimmer, a kayak or a paddle board.
+    """
+
+    encounters: int | None = None
+    people_factor: int = 1
+
+
+AS_DRAWN = Traffic()
 DrawThing = Callable[[MeetingPlace, np.random.Generator], Obstacle | Actor | None]
 DrawEncounter = Callable[[MeetingPlace, np.random.Generator], Sequence[Obstacle | Actor]]
 
 
-def draw_random_scenario(kind: str, seed: int) -> Scenario:
+def draw_random_scenario(kind: str, seed: int, met: Traffic = AS_DRAWN) -> Scenario:
     """The scenario of this kind of world and seed (0 or more), always the same. Raises UserError for an unknown world.
 
     The boat follows an open stretch of the world's route. Whatever is met, a gap of 3 m leads on at any time.
@@ -61,7 +74,7 @@ def draw_random_scenario(kind: str, seed: int) -> Scenario:
         world, draw = _draw_weather(load_world(kind), rng), _draw_encounter
     world = dataclasses.replace(world, actors=())
     while True:
-        found = _draw_route_with_encounters(world, draw, rng)
+        found = _draw_route_with_encounters(world, draw, met, rng)
         if found is not None:
             break
     if kind == WATERWAY:
@@ -75,7 +88,9 @@ def draw_random_scenario(kind: str, seed: int) -> Scenario:
     )
 
 
-def _draw_route_with_encounters(world: World, draw: DrawEncounter, rng: np.random.Generator) -> World | None:
+def _draw_route_with_encounters(
+    world: World, draw: DrawEncounter, met: Traffic, rng: np.random.Generator
+) -> World | None:
     """A stretch somewhere along the route with at least one encounter, or None where it does not work out."""
     from_m, length_m = rng.uniform(0.0, world.route_length_m), rng.uniform(*ROUTE_LENGTH_RANGE_M)
     route = RouteFrame(world.route_m, closed=world.route_closed, first_m=from_m)
@@ -87,12 +102,13 @@ def _draw_route_with_encounters(world: World, draw: DrawEncounter, rng: np.rando
         section.obstacles, (), MIN_PASSAGE_M, NOMINAL_BOAT_MPS
     ):
         return None
-    wanted, meetings_m = int(rng.integers(1, MAX_ENCOUNTERS + 1)), list[float]()
+    drawn, meetings_m = int(rng.integers(1, MAX_ENCOUNTERS + 1)), list[float]()
+    wanted = met.encounters or drawn
     for number in range(MAX_TRIES):
         at_m = float(rng.uniform(10.0, length_m - GOAL_CLEARANCE_M))
         if any(abs(at_m - other_m) < ENCOUNTER_SPACING_M for other_m in meetings_m):
             continue
-        things = draw(MeetingPlace(section, route, length_m, at_m, f"met_{number}"), rng)
+        things = draw(MeetingPlace(section, route, length_m, at_m, f"met_{number}", met.people_factor), rng)
         candidate = _add_things(section, things)
         if (
             things
@@ -109,7 +125,8 @@ def _draw_route_with_encounters(world: World, draw: DrawEncounter, rng: np.rando
 
 def _draw_encounter(place: MeetingPlace, rng: np.random.Generator) -> Sequence[Obstacle | Actor]:
     """One of the things of the worlds whose layout is fixed; none where it does not work out."""
-    thing = _KINDS[int(rng.choice(len(_KINDS), p=_PROBABILITIES))](place, rng)
+    shares = np.array(_SHARES) * [place.people_factor if kind is _draw_swimmer else 1 for kind in _KINDS]
+    thing = _KINDS[int(rng.choice(len(_KINDS), p=shares / shares.sum()))](place, rng)
     return () if thing is None else (thing,)
 
 
@@ -187,8 +204,12 @@ def _draw_adrift(place: MeetingPlace, rng: np.random.Generator) -> Actor | None:
     return _build_sized(place, str(rng.choice(ADRIFT)), timed_path, speed_mps, Behaviour.HOLDS_ON, rng)
 
 
+def _draw_look_under_way(place: MeetingPlace, rng: np.random.Generator) -> str:
+    return str(rng.choice(UNDER_WAY + (place.people_factor - 1) * ("kayak",)))
+
+
 def _draw_crossing(place: MeetingPlace, rng: np.random.Generator) -> Actor | None:
-    look = str(rng.choice(UNDER_WAY))
+    look = _draw_look_under_way(place, rng)
     turn_rad = float(rng.choice([-1.0, 1.0]) * (0.5 * math.pi + rng.normal(0.0, 0.35)))
     speed_mps = float(rng.uniform(0.6, 1.4))
     timed_path = encounter_paths.plan_crossing(
@@ -208,7 +229,7 @@ def _draw_head_on(place: MeetingPlace, rng: np.random.Generator) -> Actor | None
     timed_path = encounter_paths.plan_head_on(
         place.route, place.at_m, speed_mps=speed_mps, left_m=left_m, boat_mps=NOMINAL_BOAT_MPS
     )
-    return _build_sized(place, str(rng.choice(UNDER_WAY)), timed_path, speed_mps, Behaviour.GIVES_WAY, rng)
+    return _build_sized(place, _draw_look_under_way(place, rng), timed_path, speed_mps, Behaviour.GIVES_WAY, rng)
 
 
 def _draw_overtaking(place: MeetingPlace, rng: np.random.Generator) -> Actor | None:
@@ -224,7 +245,7 @@ def _draw_overtaking(place: MeetingPlace, rng: np.random.Generator) -> Actor | N
         left_m=float(rng.uniform(-0.8, 0.8)) if slower else beside_m,
         boat_mps=NOMINAL_BOAT_MPS,
     )
-    return _build_sized(place, str(rng.choice(UNDER_WAY)), timed_path, speed_mps, Behaviour.GIVES_WAY, rng)
+    return _build_sized(place, _draw_look_under_way(place, rng), timed_path, speed_mps, Behaviour.GIVES_WAY, rng)
 
 
 def _build_sized(
@@ -247,7 +268,7 @@ _KINDS: tuple[DrawThing, ...] = (
     _draw_head_on,
     _draw_overtaking,
 )
-_PROBABILITIES = (0.22, 0.18, 0.12, 0.12, 0.14, 0.12, 0.10)
+_SHARES = (0.22, 0.18, 0.12, 0.12, 0.14, 0.12, 0.10)
 
 
 def _draw_weather(world: World, rng: np.random.Generator) -> World:

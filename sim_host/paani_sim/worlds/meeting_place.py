@@ -13,13 +13,14 @@ from paani_sim.worlds.world import Actor, Behaviour, World
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class MeetingPlace:
-    """Where along the route a thing is met, and its id."""
+    """Where along the route a thing is met, its id, and how often people in the water or on it are (`Traffic`)."""
 
     world: World
     route: RouteFrame
     length_m: float
     at_m: float
     id: str
+    people_factor: int = 1
 
 
 def build_actor(

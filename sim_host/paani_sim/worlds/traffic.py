@@ -68,6 +68,9 @@ ACTOR_KINDS = {
 }
 
 
+PEOPLE = ("swimmers", "kayaks", "paddle_boards")
+
+
 class _Meeting(NamedTuple):
     """What a group's members have in common."""
 
@@ -81,10 +84,11 @@ class _Meeting(NamedTuple):
 
 def draw_encounter(place: MeetingPlace, rng: np.random.Generator) -> Sequence[Obstacle | Actor]:
     """One actor of the catalogue, or a group; none where it does not work out there."""
-    weights = np.array([kind.weight for kind in ACTOR_KINDS.values()])
-    name = str(rng.choice(list(ACTOR_KINDS), p=weights / weights.sum()))
+    factor = place.people_factor
+    weights = np.array([kind.weight * (factor if name in PEOPLE else 1) for name, kind in ACTOR_KINDS.items()])
+    chosen = str(rng.choice(list(ACTOR_KINDS), p=weights / weights.sum()))
     for _ in range(TRIES):
-        if found := draw_actors(name, place, rng):
+        if found := draw_actors(chosen, place, rng):
             return found
     return ()
 

@@ -1,6 +1,7 @@
 """Sweeps: the cases, the worlds that they are driven in, and the figures."""
 
 import xml.etree.ElementTree as ET
+from collections import Counter
 from pathlib import Path
 
 import msgspec
@@ -13,6 +14,7 @@ from paani_sim.trials.conditions import CONDITIONS, MOST_VALUES, parse_sweep
 from paani_sim.trials.policies import Policy
 from paani_sim.trials.sweep import plot_sweep, tabulate_sweep
 from paani_sim.trials.trial_cases import SUITES, TrialCase, build_scenario, list_cases, parse_case
+from paani_sim.worlds.generate import MAX_ENCOUNTERS
 from tests.unit.paani_sim.trials.trial_results import RESULT
 
 SWEPT = parse_sweep("current_mps=0,0.30,3")
@@ -48,6 +50,30 @@ def test_only_the_condition_of_a_world_changes() -> None:
         )
 
 
+@pytest.mark.parametrize("world", ["canal", "waterway"])
+def test_more_people_are_met_where_the_sweep_says_so(world: str) -> None:
+    """Nothing else about the traffic changes: a factor of one draws what the seed draws."""
+
+    def count(swept: str) -> Counter[bool]:
+        cases = [TrialCase(world, seed, Policy.BLIND, swept=swept) for seed in range(8)]
+        met = [each for case in cases for each in build_scenario(case).world.actors]
+        return Counter(each.look in {"swimming", "kayak", "paddleboard"} for each in met)
+
+    plain, many = count(""), count("people_factor=4")
+    assert count("people_factor=1") == plain
+    assert many[True] / many.total() > 1.3 * plain[True] / plain.total()
+
+
+def test_as_many_encounters_are_met_as_the_sweep_says() -> None:
+    def met(seed: int, wanted: int) -> set[str]:
+        world = build_scenario(TrialCase("lake", seed, Policy.BLIND, swept=f"encounters={wanted}")).world
+        names = [each.id for each in world.obstacles] + [each.id for each in world.actors]
+        return {name for name in names if name.startswith("met_")}
+
+    assert all(len(met(seed, 1)) == 1 for seed in range(4))
+    assert max(len(met(seed, 6)) for seed in range(4)) > MAX_ENCOUNTERS
+
+
 def test_the_figures_of_a_sweep_are_by_policy_and_value() -> None:
     """Rows in order of the values, with Wilson intervals; and a chart of each share with both bars."""
     touched = msgspec.structs.replace(RESULT, collisions=1, completed=False)
@@ -80,6 +106,9 @@ def test_the_figures_of_a_sweep_are_by_policy_and_value() -> None:
         (("--sweep", "wind_mps=1", "--report", "a.html"), "--report is not for --sweep"),
         (("--svg", "a.svg"), "--svg needs --sweep"),
         (("--one", "lake@tide=1:1:paani"), "no condition 'tide'"),
+        (("--sweep", "people_factor=1.5"), "people_factor is a whole number"),
+        (("--one", "imazu-01@encounters=2:1:paani"), "imazu-01 says itself what is met"),
+        (("--scenario", "imazu-01", "--sweep", "people_factor=2"), "imazu-01 says itself what is met"),
     ],
 )
 def test_a_sweep_that_is_none_is_refused(
