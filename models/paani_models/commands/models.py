@@ -143,6 +143,10 @@ def _parser() -> argparse.ArgumentParser:
     export.add_argument(
         "--looks-at", metavar="HEIGHTxWIDTH", help="segmenters: the picture inside, of a training that ended smaller"
     )
+    export.add_argument(
+        "--mean-with", type=Path, metavar="FILE", help="detector: the mean of the checkpoint's weights and these"
+    )
+    export.add_argument("--share", type=float, default=0.5, help="of --mean-with's weights in it; 0.5 if not given")
     evaluate = commands.add_parser("evaluate", help="figures of the exported nets on held-out sequences")
     evaluate_command.add_arguments(evaluate)
     report = commands.add_parser("report", help="one page of tables, curves and pictures, outside the repository")
@@ -285,5 +289,7 @@ def _train_or_export(arguments: argparse.Namespace) -> int:
             arguments.weights,
             pictures,
             looks_at=arguments.looks_at,
+            mean_with=arguments.mean_with,
+            share=arguments.share,
         )
     return 0

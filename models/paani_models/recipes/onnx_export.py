@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import msgspec
@@ -143,16 +143,20 @@ def export_network(
     licence: str | None = None,
     *,
     looks_at: tuple[int, int] | None = None,
+    change: Callable[[nn.Module], None] | None = None,
 ) -> Model:
     """Write the ONNX file into `folder` and its manifest entry, both by renaming, and return the entry.
 
     licence: that of the contract, which is for research, where not given.
+    change: what is done to the checkpoint's weights before.
     looks_at: height and width of the picture inside a segmenter whose training ended at that size.
     inputs: real pictures, already preprocessed, for the comparison. Figures are left empty.
     Raises UserError where the checkpoint does not fit or the outputs differ by more than TOLERANCE.
     """
     net = build_network(name)
     load_averaged_weights(net, checkpoint)
+    if change is not None:
+        change(net)
     if looks_at is not None:
         net = SmallerInside(net, looks_at)
     seed = load_checkpoint(checkpoint)["recipe"]["seed"]

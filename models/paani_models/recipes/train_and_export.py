@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
 import numpy as np
 import torch
+from torch import nn
 
 from paani.errors import UserError
 from paani_models.catalogue import OTHER_SETS, PAPER_WEIGHTS, WEIGHTS, verified_path
@@ -182,6 +184,18 @@ def start_detector(data: Path, options: TrainingOptions) -> Detector:
     return model
 
 
+def blending(path: Path | None, share: float) -> Callable[[nn.Module], None]:
+    """What gives a detector's weights that share of those of a checkpoint or an exported file; nothing without one."""
+
+    def blend(model: nn.Module) -> None:
+        if path is not None:
+            other = Detector()
+            _load_detector(other, path)
+            blend_weights(model, other, share)
+
+    return blend
+
+
 def _load_detector(model: Detector, path: Path) -> None:
     """From a checkpoint or an exported ONNX file."""
     if path.suffix == ".onnx":
@@ -231,11 +245,14 @@ def export_checkpoint(
     pictures: PictureSelection,
     *,
     looks_at: str | None = None,
+    mean_with: Path | None = None,
+    share: float = 0.5,
 ) -> None:
     """Write the ONNX file and its manifest entry, with the provenance of the chosen sources.
 
-    looks_at: `HEIGHTxWIDTH` of the picture inside a segmenter. Raises UserError where that is malformed, or the network
-    is none, and rather than put one of the paper's networks in the place of ours.
+    looks_at: `HEIGHTxWIDTH` of the picture inside a segmenter. mean_with, share: a detector's earlier weights, and how
+    much of them the mean with the checkpoint's takes. Raises UserError where one is malformed or not for the network,
+    and rather than put one of the paper's networks in the place of ours.
     """
     if net in PAPER_NETWORKS and weights.resolve() == WEIGHTS.resolve():
         raise UserError(f"--weights: {net} is not what ships there; the set `paper` lies in {PAPER_WEIGHTS}")
@@ -244,6 +261,8 @@ def export_checkpoint(
         if "segmenter" not in net:
             raise UserError(f"--looks-at: {net} is no segmenter")
         inside = parse_size(looks_at)
+    if mean_with is not None and net != "detector":
+        raise UserError(f"--mean-with: {net} is no detector of ours")
     chosen = (
         pictures.boxed_samples(held_out=True)
         if net in ("detector", "yolo11n")
@@ -262,7 +281,9 @@ def export_checkpoint(
     used = {sample.source.name for sample in pictures.samples}
     origins = tuple(read_origin(pictures.source_folder(s), s) for s in pictures.sources if s.name in used)
     licence = OPEN_LICENCE if used <= set(OPEN_TERMS) else None
-    model = export_network(net, checkpoint, weights, inputs, origins, licence, looks_at=inside)
+    model = export_network(
+        net, checkpoint, weights, inputs, origins, licence, looks_at=inside, change=blending(mean_with, share)
+    )
     sys.stdout.write(
         f"{weights / model.file}: {model.size_bytes} bytes, differs by {model.export_max_abs_diff:.1e} at most\n"
     )

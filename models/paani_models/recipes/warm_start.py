@@ -17,10 +17,11 @@ from torch import Tensor, nn
 from torch.utils.hooks import RemovableHandle
 
 from paani.errors import UserError
+from paani_models.detector.shipped_network import FOCUS_SHAPE, unfold_focus
 
 
 def load_exported(model: nn.Module, path: Path, pictures: Tensor) -> None:
-    """Fill `model` with the weights of its own export.
+    """Fill `model` with the weights of its own export, or of one with YOLOX's focus layer.
 
     pictures: float32 [N,3,H,W] as the network gets them, whose statistics the normalisations take.
     Raises UserError where the file is no export of this net.
@@ -31,7 +32,8 @@ def load_exported(model: nn.Module, path: Path, pictures: Tensor) -> None:
         raise UserError(f"{path}: {len(stored)} convolutions, expected {len(convs)}")
     norms = _find_following_norms(model)
     biases: dict[nn.Conv2d, Tensor] = {}
-    for index, (conv, (weight, bias)) in enumerate(zip(convs, stored, strict=True)):
+    for index, (conv, (found, bias)) in enumerate(zip(convs, stored, strict=True)):
+        weight = unfold_focus(found) if index == 0 and found.shape[1:] == FOCUS_SHAPE else found
         if weight.shape != conv.weight.shape:
             raise UserError(
                 f"{path}: convolution {index} has shape {tuple(weight.shape)}, expected {tuple(conv.weight.shape)}"

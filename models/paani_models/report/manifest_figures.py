@@ -54,7 +54,7 @@ def measure_detector(net: Path, samples: list[Sample], workers: Workers | None =
             figures.extend(
                 Figure(f"{label}_{metric}", group, round(value, 4), positives)
                 for metric, value in row.items()
-                if np.isfinite(value)
+                if positives and np.isfinite(value)
             )
     return figures
 

@@ -67,6 +67,28 @@ def small_segmenter(path: Path) -> Path:
     return path
 
 
+def focus_layer(path: Path) -> Path:
+    """YOLOX's focus layer alone: the four quarters of a picture as twelve channels."""
+    _, colours, height, width = SHAPE
+    nodes, quarters = [], []
+    for column in (0, 1):
+        for row in (0, 1):
+            rows, quarter = f"rows_{column}{row}", f"quarter_{column}{row}"
+            nodes.append(helper.make_node("Slice", ["input", f"at_{row}", "end", "rows", "two"], [rows]))
+            nodes.append(helper.make_node("Slice", [rows, f"at_{column}", "end", "columns", "two"], [quarter]))
+            quarters.append(quarter)
+    numbers = {"at_0": 0, "at_1": 1, "end": 2**63 - 1, "rows": 2, "columns": 3, "two": 2}
+    graph = helper.make_graph(
+        [*nodes, helper.make_node("Concat", quarters, ["focused"], axis=1)],
+        "focus",
+        [helper.make_tensor_value_info("input", TensorProto.FLOAT, SHAPE)],
+        [helper.make_tensor_value_info("focused", TensorProto.FLOAT, (1, 4 * colours, height // 2, width // 2))],
+        [numpy_helper.from_array(np.array([value], np.int64), name) for name, value in numbers.items()],
+    )
+    onnx.save(helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8), str(path))
+    return path
+
+
 def place(model: Path, param: str, weights: bytes) -> Path:
     """Converted files beside a model, with the record that belongs to them."""
     files = ncnn_files(model)

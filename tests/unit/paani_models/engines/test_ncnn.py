@@ -35,6 +35,7 @@ from tests.unit.paani_models.engines.ncnn_networks import (  # noqa: E402
     RESIZED,
     SHAPE,
     WATER_BIAS,
+    focus_layer,
     packed,
     place,
     program,
@@ -218,16 +219,14 @@ def test_a_missing_pnnx_is_reported_with_its_remedy(
     assert capsys.readouterr().err == "paani models: --pnnx no/pnnx: no such program\n"
 
 
-@pytest.mark.parametrize("name", ["detector", "segmenter"])
-def test_replacing_strided_slices_changes_no_bit(tmp_path: Path, name: str) -> None:
-    model = replace_strided_slices(onnx.load(str(verified_path(name))))
+def test_replacing_strided_slices_changes_no_bit(tmp_path: Path) -> None:
+    source = focus_layer(tmp_path / "focus.onnx")
+    model = replace_strided_slices(onnx.load(str(source)))
     onnx.checker.check_model(model, full_check=True)
     onnx.save(model, str(tmp_path / "joined.onnx"))
-    contract = load_catalogue()[name]
-    plain, joined = open_network(verified_path(name), 1), open_network(tmp_path / "joined.onnx", 1)
-    for x in prepare_inputs(contract, []).values():
-        np.testing.assert_array_equal(joined(x), plain(x))
-    assert not [node.name for node in model.graph.node if node.op_type == "Slice" and "input" in node.input]
+    x = np.random.default_rng(0).random(SHAPE, np.float32)
+    np.testing.assert_array_equal(open_network(tmp_path / "joined.onnx", 1)(x), open_network(source, 1)(x))
+    assert [node.op_type for node in model.graph.node] == ["Conv"]
 
 
 @needs_pnnx

@@ -27,7 +27,13 @@ from paani_models.recipes.onnx_export import (  # noqa: E402
     largest_export_difference,
     write_onnx,
 )
-from paani_models.recipes.train_and_export import TrainingOptions, parse_size, parse_stages, start_detector  # noqa: E402
+from paani_models.recipes.train_and_export import (  # noqa: E402
+    TrainingOptions,
+    blending,
+    parse_size,
+    parse_stages,
+    start_detector,
+)
 from paani_models.recipes.warm_start import load_exported  # noqa: E402
 from paani_models.segmenter import train as segmenter_train  # noqa: E402
 from paani_models.segmenter.paper_augmentation import augment_paper_pair  # noqa: E402
@@ -161,6 +167,20 @@ def test_a_detector_is_exported_for_the_size_that_it_was_trained_with(
     inputs = [np.random.default_rng(0).random((1, 3, 64, 96), dtype=np.float32)]
     model = export_network("detector", tmp_path / "last.pt", tmp_path / "out", inputs, ())
     assert (model.input.shape, model.output.shape) == ((1, 3, 64, 96), (1, 8, 8 * 12 + 4 * 6 + 2 * 3))
+
+
+@pytest.mark.train
+def test_a_detector_is_exported_with_a_share_of_earlier_weights(tmp_path: Path) -> None:
+    earlier, later, loaded = Detector(), Detector(), Detector()
+    recipe = {"seed": 1, "height_px": 64, "width_px": 96}
+    save_checkpoint(tmp_path / "earlier.pt", {"average": earlier.state_dict()})
+    save_checkpoint(tmp_path / "later.pt", {"average": later.state_dict(), "recipe": recipe})
+    inputs = [np.random.default_rng(0).random((1, 3, 64, 96), dtype=np.float32)]
+    change = blending(tmp_path / "earlier.pt", 0.25)
+    export_network("detector", tmp_path / "later.pt", tmp_path, inputs, (), change=change)
+    load_exported(loaded, tmp_path / "detector.onnx", torch.zeros(1, 3, 64, 96))
+    wanted = 0.25 * earlier.stem.conv.weight + 0.75 * later.stem.conv.weight
+    torch.testing.assert_close(loaded.stem.conv.weight, wanted)
 
 
 def test_a_size_is_height_times_width_in_whole_cells() -> None:
@@ -298,6 +318,8 @@ def test_a_picture_inside_is_of_a_segmenter_and_of_whole_cells(
     where = ["--data", str(tmp_path), "--sources", "surf_people", "--checkpoint", "last.pt", "--weights", str(tmp_path)]
     assert main(["export", *words, *where]) == 2
     assert "--looks-at: detector" in (message := capsys.readouterr().err) or "multiples of 32" in message
+    assert main(["export", "segmenter", "--mean-with", "earlier.onnx", *where]) == 2
+    assert capsys.readouterr().err == "paani models: --mean-with: segmenter is no detector of ours\n"
 
 
 @pytest.mark.parametrize("net", ["paper-segmenter", "yolo11n"])

@@ -5,14 +5,17 @@ from pathlib import Path
 import numpy as np
 import onnx
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 torch = pytest.importorskip("torch", reason="needs the extra paani[train]")
 
 from torch import Tensor, nn  # noqa: E402
+from torch.nn import functional as F  # noqa: E402
 
 from paani.errors import UserError  # noqa: E402
 from paani_models.catalogue import WEIGHTS  # noqa: E402
-from paani_models.detector.shipped_network import Detector  # noqa: E402
+from paani_models.detector.shipped_network import FOCUS_SHAPE, Detector, unfold_focus  # noqa: E402
 from paani_models.engines.onnx_runner import open_network  # noqa: E402
 from paani_models.network_input import DETECTOR_SIZE_WH, SIZE_WH  # noqa: E402
 from paani_models.recipes.onnx_export import CONTRACTS, write_onnx  # noqa: E402
@@ -76,6 +79,30 @@ def test_the_shipped_detector_loads_exactly() -> None:
     theirs = open_network(WEIGHTS / "detector.onnx")(x.numpy())
     np.testing.assert_allclose(ours[:, 4:], theirs[:, 4:], atol=1e-4)
     np.testing.assert_allclose(ours[:, :4], theirs[:, :4], atol=1e-2)
+
+
+@given(seed=st.integers(0, 2**16), height=st.sampled_from([2, 4, 10]), width=st.sampled_from([2, 6]))
+def test_one_convolution_over_the_picture_does_what_one_over_its_quarters_does(
+    seed: int, height: int, width: int
+) -> None:
+    generator = torch.Generator().manual_seed(seed)
+    weight = torch.rand(5, *FOCUS_SHAPE, generator=generator)
+    x = torch.rand(1, 3, height, width, generator=generator)
+    quarters = torch.cat([x[..., row::2, column::2] for column in (0, 1) for row in (0, 1)], 1)  # YOLOX's order
+    wanted = F.conv2d(quarters, weight, padding=1)
+    torch.testing.assert_close(F.conv2d(x, unfold_focus(weight), stride=2, padding=2), wanted)
+
+
+def test_an_export_with_a_focus_layer_loads_as_one_without(tmp_path: Path) -> None:
+    focused = torch.rand(16, *FOCUS_SHAPE)
+    graph = onnx.load(str(WEIGHTS / "detector.onnx"))
+    first = next(node for node in graph.graph.node if node.op_type == "Conv").input[1]
+    stored = next(tensor for tensor in graph.graph.initializer if tensor.name == first)
+    stored.CopyFrom(onnx.numpy_helper.from_array(focused.numpy(), first))
+    onnx.save(graph, str(tmp_path / "focused.onnx"))
+    loaded = Detector()
+    load_exported(loaded, tmp_path / "focused.onnx", pictures(1, DETECTOR_SIZE_WH))
+    torch.testing.assert_close(loaded.stem.conv.weight.data, unfold_focus(focused))
 
 
 def test_another_net_is_named(tmp_path: Path) -> None:
