@@ -61,13 +61,13 @@ class Teacher:
         return Taught(boxes, log_scores(logits)[0].exp() * known, known)
 
 
-def blend_weights(model: nn.Module, other: nn.Module, share: float) -> None:
+def blend_weights(model: nn.Module, other: nn.Module, share: float, option: str = "--blend") -> None:
     """Move the model's weights towards another's by `share` (Wortsman et al. 2022); 0 leaves them, 1 takes the other's.
 
-    Raises UserError where the share lies outside 0..1.
+    Raises UserError naming the option whose share lies outside 0..1.
     """
     if not 0.0 <= share <= 1.0:
-        raise UserError(f"a share of {share} lies outside 0..1")
+        raise UserError(f"{option}: {share} lies outside 0..1")
     theirs = other.state_dict()
     with torch.no_grad():
         for name, value in model.state_dict().items():

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -178,22 +178,15 @@ def start_detector(data: Path, options: TrainingOptions) -> Detector:
     else:
         _load_detector(model, options.start)
     if options.mean_with is not None:
-        other = Detector()
-        _load_detector(other, options.mean_with)
-        blend_weights(model, other, 0.5)
+        take_share(model, options.mean_with, 0.5)
     return model
 
 
-def blending(path: Path | None, share: float) -> Callable[[nn.Module], None]:
-    """What gives a detector's weights that share of those of a checkpoint or an exported file; nothing without one."""
-
-    def blend(model: nn.Module) -> None:
-        if path is not None:
-            other = Detector()
-            _load_detector(other, path)
-            blend_weights(model, other, share)
-
-    return blend
+def take_share(model: nn.Module, path: Path, share: float) -> None:
+    """Give a detector's weights that share of those of a checkpoint or an exported file. Raises UserError."""
+    other = Detector()
+    _load_detector(other, path)
+    blend_weights(model, other, share, "--share")
 
 
 def _load_detector(model: Detector, path: Path) -> None:
@@ -281,9 +274,8 @@ def export_checkpoint(
     used = {sample.source.name for sample in pictures.samples}
     origins = tuple(read_origin(pictures.source_folder(s), s) for s in pictures.sources if s.name in used)
     licence = OPEN_LICENCE if used <= set(OPEN_TERMS) else None
-    model = export_network(
-        net, checkpoint, weights, inputs, origins, licence, looks_at=inside, change=blending(mean_with, share)
-    )
+    change = None if mean_with is None else partial(take_share, path=mean_with, share=share)
+    model = export_network(net, checkpoint, weights, inputs, origins, licence, looks_at=inside, change=change)
     sys.stdout.write(
         f"{weights / model.file}: {model.size_bytes} bytes, differs by {model.export_max_abs_diff:.1e} at most\n"
     )

@@ -20,7 +20,7 @@ from paani.option_paths import output_file, output_folder
 from paani.statistics.figure_table import table_text
 from paani.whole_file import indented_json, write_json, write_whole
 from paani_sim.trials.checkout import LEDGER_NAME, find_checkout, resolve_commit
-from paani_sim.trials.conditions import CONDITIONS, TRAFFIC, parse_sweep
+from paani_sim.trials.conditions import SWEPT, parse_sweep
 from paani_sim.trials.drive_states import DriveOutcome
 from paani_sim.trials.fingerprint import FingerprintReader
 from paani_sim.trials.ledger import Ledger
@@ -215,7 +215,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--sweep", type=parse_sweep, default=(), metavar="NAME=V,V,...",
-        help=f"each drive under each value of one condition: {', '.join((*CONDITIONS, *TRAFFIC))}",
+        help=f"each drive under each value of one condition: {', '.join(SWEPT)}",
     )  # fmt: skip
     parser.add_argument("--svg", type=output_file("--svg"), metavar="FILE", help="plot the sweep there")
     add_cluster_argument(parser)

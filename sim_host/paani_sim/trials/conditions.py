@@ -16,11 +16,11 @@ MOST_VALUES = 20  # of one sweep
 
 
 class Condition(NamedTuple):
-    """The values that a condition may have, as in a scenario file, and how a world gets one; None for what is met."""
+    """The values that a condition may have, as in a scenario file, and how a world gets one."""
 
     least: float
     most: float
-    apply: Callable[[World, float], World] | None
+    apply: Callable[[World, float], World]
 
 
 def _part(part: str, name: str, factor: float = 1.0) -> Callable[[World, float], World]:
@@ -31,6 +31,10 @@ def _part(part: str, name: str, factor: float = 1.0) -> Callable[[World, float],
     return apply
 
 
+def _as_it_is(world: World, _value: float) -> World:
+    return world
+
+
 CONDITIONS = {
     "current_mps": Condition(0.0, 3.0, _part("current", "speed_mps")),
     "wind_mps": Condition(0.0, 30.0, _part("wind", "speed_mps")),
@@ -38,7 +42,9 @@ CONDITIONS = {
     "rain_mmph": Condition(0.0, 100.0, _part("light", "rain_mmph")),
     "sun_elevation_deg": Condition(0.0, 90.0, _part("light", "sun_elevation_rad", math.pi / 180.0)),
 }
-TRAFFIC = {"encounters": Condition(1, 6, None), "people_factor": Condition(1, 4, None)}  # whole numbers
+# Whole numbers, of what is drawn into a world: `traffic_of`.
+TRAFFIC = {"encounters": Condition(1, 6, _as_it_is), "people_factor": Condition(1, 4, _as_it_is)}
+SWEPT = CONDITIONS | TRAFFIC
 
 
 def parse_sweep(text: str) -> tuple[str, ...]:
@@ -56,17 +62,16 @@ def parse_sweep(text: str) -> tuple[str, ...]:
 def parse_setting(text: str) -> tuple[str, float]:
     """The condition and the value of `NAME=V`. Raises UserError."""
     name, _, given = text.partition(VALUE_SEPARATOR)
-    known = CONDITIONS | TRAFFIC
-    if name not in known:
-        raise UserError(f"--sweep {text}: no condition '{name}' (have: {', '.join(known)})")
-    condition = known[name]
+    if name not in SWEPT:
+        raise UserError(f"--sweep {text}: no condition '{name}' (have: {', '.join(SWEPT)})")
+    condition = SWEPT[name]
     try:
         value = float(given)
     except ValueError:
         raise UserError(f"--sweep {text}: '{given}' is no number") from None
     if not condition.least <= value <= condition.most:
         raise UserError(f"--sweep {text}: {name} is {condition.least:g} to {condition.most:g}")
-    if condition.apply is None and not value.is_integer():
+    if name in TRAFFIC and not value.is_integer():
         raise UserError(f"--sweep {text}: {name} is a whole number")
     return name, value
 
@@ -74,8 +79,7 @@ def parse_setting(text: str) -> tuple[str, float]:
 def with_condition(world: World, text: str) -> World:
     """The world with the condition of `NAME=V`; as it is where that is of what is met. Raises UserError."""
     name, value = parse_setting(text)
-    apply = CONDITIONS[name].apply if name in CONDITIONS else None
-    return world if apply is None else apply(world, value)
+    return SWEPT[name].apply(world, value)
 
 
 def traffic_of(text: str) -> Traffic:

@@ -39,7 +39,7 @@ def test_weights_are_blended_by_share() -> None:
     before = one.stem.conv.weight.detach().clone()
     blend_weights(one, other, 0.25)
     torch.testing.assert_close(one.stem.conv.weight, 0.75 * before + 0.25 * other.stem.conv.weight)
-    with pytest.raises(UserError, match="a share of"):
+    with pytest.raises(UserError, match="--blend"):
         blend_weights(one, other, 1.5)
 
 

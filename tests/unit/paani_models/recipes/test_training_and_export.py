@@ -1,6 +1,7 @@
 """Training machinery: schedule, order, averages, checkpoints, and a resumed run that equals an unbroken one."""
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import cv2
@@ -29,10 +30,10 @@ from paani_models.recipes.onnx_export import (  # noqa: E402
 )
 from paani_models.recipes.train_and_export import (  # noqa: E402
     TrainingOptions,
-    blending,
     parse_size,
     parse_stages,
     start_detector,
+    take_share,
 )
 from paani_models.recipes.warm_start import load_exported  # noqa: E402
 from paani_models.segmenter import train as segmenter_train  # noqa: E402
@@ -176,7 +177,7 @@ def test_a_detector_is_exported_with_a_share_of_earlier_weights(tmp_path: Path) 
     save_checkpoint(tmp_path / "earlier.pt", {"average": earlier.state_dict()})
     save_checkpoint(tmp_path / "later.pt", {"average": later.state_dict(), "recipe": recipe})
     inputs = [np.random.default_rng(0).random((1, 3, 64, 96), dtype=np.float32)]
-    change = blending(tmp_path / "earlier.pt", 0.25)
+    change = partial(take_share, path=tmp_path / "earlier.pt", share=0.25)
     export_network("detector", tmp_path / "later.pt", tmp_path, inputs, (), change=change)
     load_exported(loaded, tmp_path / "detector.onnx", torch.zeros(1, 3, 64, 96))
     wanted = 0.25 * earlier.stem.conv.weight + 0.75 * later.stem.conv.weight

@@ -50,6 +50,7 @@ def test_only_the_condition_of_a_world_changes() -> None:
         )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("world", ["canal", "waterway"])
 def test_more_people_are_met_where_the_sweep_says_so(world: str) -> None:
     """Nothing else about the traffic changes: a factor of one draws what the seed draws."""
