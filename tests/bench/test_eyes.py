@@ -12,7 +12,7 @@ import pytest
 from paani.config import CorridorConfig, DetectorConfig, load_config
 from paani.errors import UserError
 from paani_services.perception.corridors import classify_cells, summarise_corridors
-from paani_services.perception.engine import OnnxEngine
+from paani_services.perception.engine import OnnxEngine, share_arena
 from paani_tools.bench.eyes import paper_shaped
 from paani_tools.bench.eyes.command import Eyes, main, text
 from paani_tools.bench.eyes.stages import Row, Step, measure_steps, ratios, rows
@@ -91,6 +91,7 @@ def test_all_networks_of_a_process_take_memory_from_one_arena() -> None:
     for role in ("detector", "segmenter", "gate"):
         options = OnnxEngine.load(role, "", 1)._session.get_session_options()
         assert options.get_session_config_entry("session.use_env_allocators") == "1"
+    assert share_arena.cache_info().currsize == 1, "without a registered arena the option does nothing"
 
 
 @pytest.mark.parametrize(
