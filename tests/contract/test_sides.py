@@ -31,11 +31,13 @@ PROFILE = {Graph.SIMULATION: "paani", Graph.HIL: "hil", Graph.HULL: "hull"}
 PREFIX = "paani/43/otter/"
 
 
-@pytest.fixture
-def runtime(tmp_path: Path) -> str:
+@pytest.fixture(scope="module")
+def runtime(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """A folder with every graph's passwords; nobody changes it."""
+    folder = str(tmp_path_factory.mktemp("runtime"))
     for graph in Graph:
-        authority.ensure_credentials(BusConfig(runtime_dir=str(tmp_path), graph=graph))
-    return str(tmp_path)
+        authority.ensure_credentials(BusConfig(runtime_dir=folder, graph=graph))
+    return folder
 
 
 def config_on(side: Side, graph: Graph, runtime: str) -> Config:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import stat
 import subprocess
 import sys
@@ -41,6 +42,21 @@ def made(tmp_path: Path, graph: Graph = Graph.SIMULATION, now_us: int = NOW_US, 
     return folder
 
 
+@pytest.fixture(scope="module")
+def originals(tmp_path_factory: pytest.TempPathFactory) -> dict[Graph, Path]:
+    """A folder of certificates for each graph, to be copied: making one waits for the disk a hundred times."""
+    return {graph: made(tmp_path_factory.mktemp(graph), graph) for graph in (Graph.SIMULATION, Graph.HULL)}
+
+
+@pytest.fixture
+def folder(tmp_path: Path, originals: dict[Graph, Path], request: pytest.FixtureRequest) -> Path:
+    """A copy of a graph's own, the simulation's unless a test asks for another; what it holds is as it was made."""
+    return Path(shutil.copytree(originals[getattr(request, "param", Graph.SIMULATION)], tmp_path / "certs"))
+
+
+HULL = pytest.mark.parametrize("folder", [Graph.HULL], indirect=True)
+
+
 def contents(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
@@ -56,9 +72,8 @@ def test_every_identity_has_a_private_key_and_nobody_else_may_read_it(tmp_path: 
     assert require_certificates(bus, names[1:]).graph is graph
 
 
-def test_an_independent_program_verifies_what_was_signed(tmp_path: Path) -> None:
+def test_an_independent_program_verifies_what_was_signed(folder: Path) -> None:
     """A listener at the addresses that were given; a client cannot pass for one."""
-    folder = made(tmp_path)
     base = ["openssl", "verify", "-x509_strict", "-CAfile", str(folder / "authority.1.pem")]
 
     def verify(name: str, *words: str) -> int:
@@ -72,8 +87,7 @@ def test_an_independent_program_verifies_what_was_signed(tmp_path: Path) -> None
     assert verify("controller", "-purpose", "sslserver") != 0
 
 
-def test_rotating_one_leaves_the_others(tmp_path: Path) -> None:
-    folder = made(tmp_path)
+def test_rotating_one_leaves_the_others(folder: Path) -> None:
     before = contents(folder)
     certificates.rotate(folder, "advisor", NOW_US, 30)
     after = contents(folder)
@@ -91,10 +105,10 @@ def forget(folder: Path, *names: str) -> None:
         path.unlink()
 
 
+@HULL
 def test_what_an_older_folder_lacks_is_told_and_made_without_changing_the_others(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    folder = made(tmp_path, Graph.HULL)
     certificates.revoke(folder, "advisor")
     forget(folder, "button", PAGE)
     bus, before = BusConfig(certificates=str(folder), graph=Graph.HULL), contents(folder)
@@ -116,8 +130,8 @@ def test_what_an_older_folder_lacks_is_told_and_made_without_changing_the_others
     assert capsys.readouterr().out == f"{folder}: none is missing\n"
 
 
-def test_nothing_is_made_where_the_authority_has_no_key(tmp_path: Path) -> None:
-    folder = made(tmp_path, Graph.HULL)
+@HULL
+def test_nothing_is_made_where_the_authority_has_no_key(folder: Path) -> None:
     forget(folder, "button")
     (folder / "authority.1.key").unlink()
     before = contents(folder)
@@ -126,8 +140,7 @@ def test_nothing_is_made_where_the_authority_has_no_key(tmp_path: Path) -> None:
     assert contents(folder) == before
 
 
-def test_a_revoked_identity_has_no_rights_until_it_gets_new_ones(tmp_path: Path) -> None:
-    folder = made(tmp_path)
+def test_a_revoked_identity_has_no_rights_until_it_gets_new_ones(folder: Path) -> None:
     bus = BusConfig(certificates=str(folder))
 
     def subjects() -> str:
@@ -146,8 +159,7 @@ def test_a_revoked_identity_has_no_rights_until_it_gets_new_ones(tmp_path: Path)
     assert "'controller.2'" in subjects()
 
 
-def test_what_cannot_be_written_changes_nothing(tmp_path: Path) -> None:
-    folder = made(tmp_path)
+def test_what_cannot_be_written_changes_nothing(folder: Path) -> None:
     (folder / f".{INDEX_FILE}.{os.getpid()}").mkdir()
     before = {path.name for path in folder.iterdir()}
     for name in ("controller", "all"):
@@ -182,8 +194,7 @@ def test_out_of_date_is_told_with_file_and_date(tmp_path: Path, shift_days: int,
     assert main(["show", "--folder", str(folder)]) == 1
 
 
-def test_what_is_not_in_force_or_not_private_is_told(tmp_path: Path) -> None:
-    folder = made(tmp_path)
+def test_what_is_not_in_force_or_not_private_is_told(folder: Path) -> None:
     bus = BusConfig(certificates=str(folder))
     (folder / "advisor.1.key").chmod(0o640)
     with pytest.raises(UserError, match=r"advisor\.1\.key: others may read it"):
@@ -211,8 +222,7 @@ def test_what_is_not_in_force_or_not_private_is_told(tmp_path: Path) -> None:
         (["rotate", "thrusters"], "thrusters: no identity of the graph simulation"),
     ],
 )
-def test_mistakes_are_one_line(tmp_path: Path, words: list[str], says: str) -> None:
-    folder = made(tmp_path)
+def test_mistakes_are_one_line(folder: Path, words: list[str], says: str) -> None:
     before = contents(folder)
     with pytest.raises(UserError, match=says):
         main([*words, "--folder", str(folder)])
@@ -220,16 +230,14 @@ def test_mistakes_are_one_line(tmp_path: Path, words: list[str], says: str) -> N
 
 
 @pytest.mark.parametrize("damage", [b"", b"{}", b'{"graph": 3}', b"\xff\xfe"])
-def test_a_damaged_index_is_told(tmp_path: Path, damage: bytes) -> None:
-    folder = made(tmp_path)
+def test_a_damaged_index_is_told(folder: Path, damage: bytes) -> None:
     (folder / INDEX_FILE).write_bytes(damage)
     with pytest.raises(UserError, match=r"certs/identities\.json: "):
         require_certificates(BusConfig(certificates=str(folder)), ())
 
 
 @pytest.mark.slow
-def test_without_the_extra_making_is_one_line_and_showing_goes_on(tmp_path: Path) -> None:
-    folder = made(tmp_path)
+def test_without_the_extra_making_is_one_line_and_showing_goes_on(folder: Path) -> None:
     hide = "import sys; sys.modules['cryptography'] = None; from paani.cli import main; sys.exit(main(sys.argv[1:]))"
 
     def run(*words: str) -> subprocess.CompletedProcess[str]:

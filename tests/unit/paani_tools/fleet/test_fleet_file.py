@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -20,10 +21,17 @@ credentials = "otter"
 """
 
 
+@pytest.fixture(scope="module")
+def otter(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A vessel's folder with its passwords, to be copied."""
+    folder = tmp_path_factory.mktemp("otter")
+    ensure_credentials(BusConfig(runtime_dir=str(folder)))
+    return folder
+
+
 @pytest.fixture
-def fleet(tmp_path: Path) -> Path:
-    (tmp_path / "otter").mkdir(mode=0o700)
-    ensure_credentials(BusConfig(runtime_dir=str(tmp_path / "otter")))
+def fleet(tmp_path: Path, otter: Path) -> Path:
+    shutil.copytree(otter, tmp_path / "otter")
     file = tmp_path / "fleet.toml"
     file.write_text(OTTER)
     return file
