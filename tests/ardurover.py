@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from paani.clock import stopwatch_ms
+from tests.at_work import at_work
 from tests.mcu_peer import until
 
 MANUAL, HOLD = 0, 4
@@ -181,12 +182,11 @@ async def ardurover(program: Path, folder: Path, **parameters: float) -> AsyncIt
              "--serial1", f"tcpclient:127.0.0.1:{ground}", "--serial2", "none"]  # fmt: skip
     with (folder / "ardurover.log").open("wb") as log:
         process = await asyncio.create_subprocess_exec(program, *words, cwd=folder, stdout=log, stderr=log)
-    beating = asyncio.create_task(rover.beat())
     try:
-        await rover.get_ready()
-        yield rover
+        async with at_work(rover.beat()):
+            await rover.get_ready()
+            yield rover
     finally:
-        beating.cancel()
         if process.returncode is None:
             process.send_signal(signal.SIGKILL)
         await process.wait()

@@ -272,10 +272,12 @@ async def wait_alive(bus: Bus, service: str, process: asyncio.subprocess.Process
                 return
 
     waiting = [asyncio.create_task(token()), asyncio.create_task(process.wait())]
-    async with asyncio.timeout(START_TIMEOUT_S):
-        await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
-    for task in waiting:
-        task.cancel()
+    try:
+        async with asyncio.timeout(START_TIMEOUT_S):
+            await asyncio.wait(waiting, return_when=asyncio.FIRST_COMPLETED)
+    finally:
+        for task in waiting:
+            task.cancel()
     if process.returncode is not None:
         assert process.stderr is not None
         pytest.fail(f"{service} exited {process.returncode}: {(await process.stderr.read()).decode()[-2000:]}")

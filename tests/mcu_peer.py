@@ -172,9 +172,11 @@ async def served(serve: Callable[[asyncio.StreamReader, asyncio.StreamWriter], A
         writer.close()
 
     async with await asyncio.start_server(accept, "127.0.0.1", 0) as server:
-        yield int(server.sockets[0].getsockname()[1])
-        for task in serving:
-            task.cancel()
+        try:
+            yield int(server.sockets[0].getsockname()[1])
+        finally:
+            for task in serving:
+                task.cancel()
 
 
 async def until(condition: Callable[[], bool], seconds: float = 15.0) -> None:

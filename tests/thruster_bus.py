@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator, Coroutine
-from typing import Any
+from collections.abc import AsyncIterator
 
 from paani import keys
 from paani import messages as m
@@ -78,16 +77,3 @@ async def opened(config: Config) -> AsyncIterator[dict[str, Bus]]:
         for bus in buses.values():
             await bus.close()
         await asyncio.to_thread(router.close)
-
-
-@contextlib.asynccontextmanager
-async def at_work(*works: Coroutine[Any, Any, None]) -> AsyncIterator[None]:
-    """These go on beside what follows, and none may have ended by then."""
-    tasks = [asyncio.create_task(work) for work in works]
-    try:
-        yield
-        assert not any(task.done() for task in tasks), "never a crash"
-    finally:
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import shutil
 from collections.abc import AsyncIterator
 from typing import Any
@@ -18,6 +17,7 @@ from paani import messages as m
 from paani.bus import Bus
 from paani.clock import WallClock
 from paani_services.dashboard.pages import StaticFile, load_static_files
+from tests.at_work import at_work
 from tests.conftest import OpenAs
 
 CHROMIUM = ("chromium", "chromium-browser", "google-chrome")
@@ -99,11 +99,8 @@ class Boat:
 async def boat(open_as: OpenAs) -> AsyncIterator[Boat]:
     buses = {user: await open_as(user) for user in ("camera", "perception", "advisor", "plant")}
     boat = Boat(buses)
-    publishing = asyncio.create_task(boat.publish_forever())
-    yield boat
-    publishing.cancel()
-    with contextlib.suppress(asyncio.CancelledError):
-        await publishing
+    async with at_work(boat.publish_forever()):
+        yield boat
 
 
 @pytest.fixture

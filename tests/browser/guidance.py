@@ -12,6 +12,7 @@ from paani import keys
 from paani import messages as m
 from paani.bus import Bus
 from paani.clock import WallClock
+from tests.at_work import at_work
 
 PERIOD_S = 0.1
 ROUTE = m.Route(
@@ -64,10 +65,5 @@ async def guiding(open_as: Callable[[str], Awaitable[Bus]]) -> AsyncIterator[Gui
             guidance.publish()
             await asyncio.sleep(PERIOD_S)
 
-    publishing = asyncio.create_task(publish_forever())
-    try:
+    async with at_work(publish_forever()):
         yield guidance
-    finally:
-        publishing.cancel()
-        with contextlib.suppress(asyncio.CancelledError):
-            await publishing

@@ -15,6 +15,7 @@ from paani import messages as m
 from paani.clock import WallClock
 from paani.config import Config
 from tests.arming import arm_on_page
+from tests.at_work import at_work
 from tests.browser.test_drive import HIDE, MANUAL, WAIT_S
 from tests.browser.test_page import until, watch
 from tests.conftest import OpenAs, Spawn
@@ -107,8 +108,7 @@ async def test_a_hand_that_is_gone_is_zero_thrust(
     browser: Any, open_as: OpenAs, spawn: Spawn, config: Config, end: Callable[[Any, Link], Awaitable[None]]
 ) -> None:
     lookout, link = Lookout(await open_as("advisor"), await open_as("observer")), Link(config.dashboard.port)
-    watching = [asyncio.create_task(each) for each in (lookout.advise_forever(), lookout.keep_reports())]
-    async with contextlib.AsyncExitStack() as stack:
+    async with at_work(lookout.advise_forever(), lookout.keep_reports()), contextlib.AsyncExitStack() as stack:
         services = (*SERVICES, keys.STATION)
         await asyncio.gather(*(stack.enter_async_context(spawn(service, *SETS)) for service in services))
         await stack.enter_async_context(link.open())
@@ -133,9 +133,6 @@ async def test_a_hand_that_is_gone_is_zero_thrust(
         first_zero_us = next(report.sent_us for report in after if is_zero(report))
         assert (first_zero_us - gone_us) * 1e-6 <= LET_GO_S
         assert all(is_zero(report) for report in after if report.sent_us >= first_zero_us), "and stays so"
-        for task in watching:
-            task.cancel()
-        await asyncio.gather(*watching, return_exceptions=True)
 
 
 def is_zero(report: m.ThrustApplied) -> bool:

@@ -13,6 +13,7 @@ from paani import keys
 from paani import messages as m
 from paani.clock import WallClock
 from paani.config import Config
+from tests.at_work import at_work
 from tests.browser.test_indicator_strip import SHOWS
 from tests.browser.test_legibility import AXE, SERIOUS, SIDEWAYS, SMALL_TARGETS, SMALL_TEXT
 from tests.browser.test_page import until, watch
@@ -59,8 +60,7 @@ async def test_a_hulls_devices_and_its_battery(
                 thrusters.put(replace(THRUSTERS, source_us=now_us))
             await asyncio.sleep(0.1)
 
-    reporting = asyncio.create_task(report())
-    async with spawn("dashboard"):
+    async with at_work(report()), spawn("dashboard"):
         watched = await watch(browser, config)
         page = watched.page
         await until(page, "document.querySelector('#battery').textContent === '22.1'")
@@ -93,4 +93,3 @@ async def test_a_hulls_devices_and_its_battery(
         await until(page, "document.querySelector('#thrusters-device').classList.contains('stale')")
         assert not await page.evaluate("document.querySelector('#bridge-device').classList.contains('stale')")
         assert watched.errors == []
-    reporting.cancel()

@@ -10,10 +10,12 @@ from msgspec.structs import replace
 
 from paani import keys
 from paani import messages as m
+from paani.bus import Bus
 from paani.clock import WallClock
 from paani.config import Config
 from paani.messages import DriveMode
 from tests.arming import arm_on_page
+from tests.at_work import at_work
 from tests.browser.conftest import Boat
 from tests.browser.guidance import ORDER, guiding
 from tests.browser.test_drive import HIDE, WAIT_S, Orders, button_text, drive_manually
@@ -34,15 +36,19 @@ async def test_each_mode_is_ordered_on_the_page_and_the_advice_overridden_on_pur
     browser: Any, boat: Boat, open_as: OpenAs, spawn: Spawn, config: Config
 ) -> None:
     orders = Orders((await open_as("observer")).latest(keys.OPERATOR_ORDER))
-    async with spawn("operator"), spawn("dashboard"), guiding(open_as) as guidance:
-        predictions = guidance.navigator.publisher(keys.PREDICTION)
 
-        async def say_home() -> None:
-            while True:
-                predictions.put(replace(AHEAD, source_us=WallClock().now_us()))
-                await asyncio.sleep(0.2)
+    async def say_home(navigator: Bus) -> None:
+        predictions = navigator.publisher(keys.PREDICTION)
+        while True:
+            predictions.put(replace(AHEAD, source_us=WallClock().now_us()))
+            await asyncio.sleep(0.2)
 
-        saying = asyncio.create_task(say_home())
+    async with (
+        spawn("operator"),
+        spawn("dashboard"),
+        guiding(open_as) as guidance,
+        at_work(say_home(guidance.navigator)),
+    ):
         watched = await watch(browser, config)
         page = watched.page
         await arm_on_page(f"http://127.0.0.1:{config.dashboard.port}", config.bus)
@@ -79,5 +85,4 @@ async def test_each_mode_is_ordered_on_the_page_and_the_advice_overridden_on_pur
         await orders.until(lambda found: found.is_overridden)
         await page.evaluate(HIDE, True)
         await until(page, f"{LOG}.includes('{ENDED}its hand was not heard any more')")
-        saying.cancel()
         assert watched.errors == []

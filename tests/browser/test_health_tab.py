@@ -12,6 +12,7 @@ from paani import messages as m
 from paani.clock import WallClock
 from paani.config import Config
 from paani.runtime import LOGS, runtime_path
+from tests.at_work import at_work
 from tests.browser.conftest import Boat
 from tests.browser.test_page import until, watch
 from tests.conftest import OpenAs, Spawn
@@ -44,8 +45,7 @@ async def test_a_row_for_each_process_and_the_last_lines_of_its_log(
             )  # fmt: skip
             await asyncio.sleep(0.5)
 
-    reporting = asyncio.create_task(report())
-    async with spawn("operator"), spawn("dashboard"):
+    async with at_work(report()), spawn("operator"), spawn("dashboard"):
         watched = await watch(browser, config)
         page = watched.page
         await page.click("[data-tab-of='health']")
@@ -62,4 +62,3 @@ async def test_a_row_for_each_process_and_the_last_lines_of_its_log(
         await until(page, "document.querySelector('#process-log-text').textContent === 'one\\ntwo'")
         assert await page.inner_text("#process-log-title") == "Log of navigator"
         assert watched.errors == []
-    reporting.cancel()

@@ -18,6 +18,7 @@ import pytest
 
 from paani.config import Config
 from tests.arming import headers_of
+from tests.at_work import at_work
 from tests.browser.conftest import Boat
 from tests.conftest import Spawn
 from tests.fuzz.damage import ODD_TEXTS, damaged_bytes, damaged_text, damaged_tree, json_bytes
@@ -142,8 +143,12 @@ async def test_every_route_refuses_what_is_hostile_and_nothing_moves(spawn: Spaw
         while True:
             armed |= (await boat.arming.next()).armed
 
-    async with spawn("operator"), spawn("dashboard") as process, aiohttp.ClientSession(origin) as client:
-        watching = asyncio.create_task(watch_arming())
+    async with (
+        spawn("operator"),
+        spawn("dashboard") as process,
+        aiohttp.ClientSession(origin) as client,
+        at_work(watch_arming()),
+    ):
         ours = await asyncio.to_thread(headers_of, origin, config.bus)
         async with client.get("/openapi.json") as answer:
             hostile = Hostile(await answer.json(), ours, random.Random(1))
@@ -183,8 +188,7 @@ async def test_every_route_refuses_what_is_hostile_and_nothing_moves(spawn: Spaw
         assert await asyncio.to_thread(rss_kib, process.pid) - before_kib < MAY_GROW_KIB
         async with client.post("/api/stop") as answer:
             assert (await answer.json())["stopped"]
-        watching.cancel()
-        assert not armed
+    assert not armed
 
 
 def rss_kib(pid: int) -> int:

@@ -13,6 +13,7 @@ from paani import keys
 from paani import messages as m
 from paani.clock import WallClock
 from paani.config import Config
+from tests.at_work import at_work
 from tests.browser.conftest import Boat
 from tests.browser.test_page import until, watch
 from tests.conftest import OpenAs, Spawn
@@ -42,8 +43,7 @@ async def test_the_strip_shows_what_the_microcontroller_shows(
                 publisher.put(msgspec.structs.replace(state, source_us=WallClock().now_us()))
             await asyncio.sleep(0.1)
 
-    reporting = asyncio.create_task(report())
-    async with spawn("dashboard", f"bridge.line={LINE}"):
+    async with at_work(report()), spawn("dashboard", f"bridge.line={LINE}"):
         watched = await watch(browser, config)
         page = watched.page
         await until(page, f"{STRIP}.dataset.kind === 'turn'")
@@ -64,7 +64,6 @@ async def test_the_strip_shows_what_the_microcontroller_shows(
         state = None
         await until(page, "document.querySelector('#indicator-facts').textContent === 'the bridge is silent'")
         assert watched.errors == []
-    reporting.cancel()
 
 
 async def test_without_a_bridge_and_devices_there_is_no_strip(

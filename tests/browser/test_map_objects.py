@@ -12,8 +12,10 @@ from msgspec.structs import replace
 
 from paani import keys
 from paani import messages as m
+from paani.bus import Bus
 from paani.clock import WallClock
 from paani.config import Config
+from tests.at_work import at_work
 from tests.browser.guidance import guiding
 from tests.browser.test_legibility import AXE, SERIOUS, SMALL_TARGETS, SMALL_TEXT
 from tests.browser.test_page import MAP_PX_PER_M, TRACK_RGB, WAIT_S, has_colour_on_map, until, watch
@@ -169,24 +171,22 @@ async def check_headings(page: Any, folder: Path) -> None:
 async def test_the_map_shows_what_the_boat_is_told_and_what_comes(
     browser: Any, open_as: OpenAs, spawn: Spawn, config: Config, tmp_path: Path
 ) -> None:
-    async with spawn("dashboard"), guiding(open_as) as guidance:
+    prediction: m.Prediction | None = AHEAD
+
+    async def publish_forever(navigator: Bus) -> None:
+        missions, predictions = navigator.publisher(keys.MISSION), navigator.publisher(keys.PREDICTION)
+        while True:
+            now_us = WallClock().now_us()
+            missions.put(replace(MISSION, source_us=now_us))
+            if prediction is not None:
+                predictions.put(replace(prediction, source_us=now_us))
+            await asyncio.sleep(0.2)
+
+    async with spawn("dashboard"), guiding(open_as) as guidance, at_work(publish_forever(guidance.navigator)):
         guidance.route = None
         guidance.odometry = replace(guidance.odometry, x_m=0.0, y_m=0.0, yaw_rad=0.0) if guidance.odometry else None
-        navigator = guidance.navigator
-        missions, predictions = navigator.publisher(keys.MISSION), navigator.publisher(keys.PREDICTION)
         watched = await watch(browser, config)
         page = watched.page
-        prediction: m.Prediction | None = AHEAD
-
-        async def publish_forever() -> None:
-            while True:
-                now_us = WallClock().now_us()
-                missions.put(replace(MISSION, source_us=now_us))
-                if prediction is not None:
-                    predictions.put(replace(prediction, source_us=now_us))
-                await asyncio.sleep(0.2)
-
-        publishing = asyncio.create_task(publish_forever())
         await until(page, "document.querySelector('#map-pose').textContent.startsWith('0.0 m E, 0.0 m N')")
         await page.wait_for_timeout(1000)
         await page.screenshot(path=tmp_path / "map.png")
@@ -205,7 +205,6 @@ async def test_the_map_shows_what_the_boat_is_told_and_what_comes(
         await page.wait_for_timeout(3600)
         assert not await has_colour_on_map(page, AMBER, 3.0, 0.0), "a way that is no longer said is no longer drawn"
         assert await has_colour_on_map(page, GREEN, -20.0, 1.0)
-        publishing.cancel()
         assert watched.errors == []
 
 

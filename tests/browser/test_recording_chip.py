@@ -12,6 +12,7 @@ from paani import keys
 from paani import messages as m
 from paani.clock import WallClock
 from paani.config import Config
+from tests.at_work import at_work
 from tests.browser.conftest import Boat
 from tests.browser.test_page import until, watch
 from tests.conftest import OpenAs, Spawn
@@ -43,20 +44,19 @@ async def test_the_page_says_whether_it_records(
         page = (await watch(browser, config)).page
         await until(page, f"{CHIP}.dataset.record === 'off' && !{CHIP}.hidden")
         assert await page.inner_text("#record") == "not recording"
-        speaking = asyncio.create_task(speak())
-        await until(page, f"{CHIP}.dataset.record === 'on'")
-        assert "REC 12 min" in await page.inner_text("#record")
-        await page.screenshot(path=tmp_path / "on.png")
-        changes = {"dropped": 3}
-        await until(page, f"{CHIP}.dataset.record === 'loses'")
-        assert "3 dropped" in await page.inner_text("#record")
-        assert await page.evaluate("document.documentElement.scrollWidth <= innerWidth")
-        changes = {"recording": False, "problem": "312 MiB left on the disk (recorder.min_free_mib)"}
-        await until(page, f"{CHIP}.dataset.record === 'off'")
-        assert "312 MiB left" in await page.evaluate(f"{CHIP}.title")
-        changes = {}
-        await until(page, f"{CHIP}.dataset.record === 'on'")
-        speaking.cancel()
+        async with at_work(speak()):
+            await until(page, f"{CHIP}.dataset.record === 'on'")
+            assert "REC 12 min" in await page.inner_text("#record")
+            await page.screenshot(path=tmp_path / "on.png")
+            changes = {"dropped": 3}
+            await until(page, f"{CHIP}.dataset.record === 'loses'")
+            assert "3 dropped" in await page.inner_text("#record")
+            assert await page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+            changes = {"recording": False, "problem": "312 MiB left on the disk (recorder.min_free_mib)"}
+            await until(page, f"{CHIP}.dataset.record === 'off'")
+            assert "312 MiB left" in await page.evaluate(f"{CHIP}.title")
+            changes = {}
+            await until(page, f"{CHIP}.dataset.record === 'on'")
         await until(page, f"{CHIP}.dataset.record === 'off'")
         await page.screenshot(path=tmp_path / "off.png")
         assert await page.evaluate(f"{CHIP}.title") == "the recorder is silent"

@@ -13,6 +13,7 @@ from msgspec.structs import replace
 
 from paani import keys
 from paani import messages as m
+from paani.bus import Bus
 from paani.clock import WallClock
 from paani.config import Config
 from paani.fence_geometry import is_allowed
@@ -21,6 +22,7 @@ from paani.map_origin import map_origin_deg
 from paani_services.navigator.files.geojson import read_geojson_line
 from paani_services.navigator.files.gpx import read_gpx
 from paani_services.navigator.files.map_frame import MapFrame
+from tests.at_work import at_work
 from tests.browser.guidance import guiding
 from tests.browser.test_legibility import AXE, SERIOUS, SMALL_TARGETS, SMALL_TEXT
 from tests.browser.test_map_objects import MISSION
@@ -169,8 +171,12 @@ async def test_land_is_drawn_marked_at_its_place_and_refused_when_it_is_sent(
             poses.put(replace(pose, source_us=now_us))
             await asyncio.sleep(0.1)
 
-    async with spawn("operator"), spawn("navigator", f"navigator.land={land}", origin), spawn("dashboard"):
-        publishing = asyncio.create_task(publish_forever())
+    async with (
+        spawn("operator"),
+        spawn("navigator", f"navigator.land={land}", origin),
+        spawn("dashboard"),
+        at_work(publish_forever()),
+    ):
         watched = await watch(browser, config)
         page, editor = watched.page, Editor(watched.page)
         await until(page, "document.querySelector('#map-pose').textContent.startsWith('0.0 m E, 0.0 m N')")
@@ -197,7 +203,6 @@ async def test_land_is_drawn_marked_at_its_place_and_refused_when_it_is_sent(
         await page.click("#editor-send")
         await editor.until_note("Accepted")
         await until(page, "!document.querySelector('#map-land').hidden")
-        publishing.cancel()
         assert [line for line in watched.errors if "409" not in line] == []
 
 
@@ -205,18 +210,22 @@ async def test_a_mission_is_drawn_checked_and_sent_as_one(
     browser: Any, open_as: OpenAs, spawn: Spawn, config: Config, tmp_path: Path
 ) -> None:
     accepted = (await open_as("observer")).latest(keys.ORDERED_MISSION)
-    async with spawn("operator"), spawn("dashboard"), guiding(open_as) as guidance:
+
+    async def publish_forever(navigator: Bus) -> None:
+        missions = navigator.publisher(keys.MISSION)
+        while True:
+            missions.put(replace(MISSION, source_us=WallClock().now_us()))
+            await asyncio.sleep(0.5)
+
+    async with (
+        spawn("operator"),
+        spawn("dashboard"),
+        guiding(open_as) as guidance,
+        at_work(publish_forever(guidance.navigator)),
+    ):
         guidance.route = None
         assert guidance.odometry is not None
         pose = guidance.odometry = replace(guidance.odometry, **HERE)
-        missions = guidance.navigator.publisher(keys.MISSION)
-
-        async def publish_forever() -> None:
-            while True:
-                missions.put(replace(MISSION, source_us=WallClock().now_us()))
-                await asyncio.sleep(0.5)
-
-        publishing = asyncio.create_task(publish_forever())
         watched = await watch(browser, config)
         page, editor = watched.page, Editor(watched.page)
         await until(page, "document.querySelector('#map-pose').textContent.startsWith('0.0 m E, 0.0 m N')")
@@ -332,4 +341,3 @@ async def test_a_mission_is_drawn_checked_and_sent_as_one(
         assert await page.evaluate(MARKS, [[], [{"keep": "in", "corners": bow}], 0]) == [
             "keep-in area 1: its edges cross"
         ]
-        publishing.cancel()

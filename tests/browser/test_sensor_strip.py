@@ -12,6 +12,7 @@ from paani import keys
 from paani import messages as m
 from paani.clock import WallClock
 from paani.config import Config
+from tests.at_work import at_work
 from tests.browser.test_page import until, watch
 from tests.conftest import OpenAs, Spawn
 
@@ -48,8 +49,7 @@ async def test_each_device_is_named_with_its_status_and_what_is_wrong(
                 publisher.put(m.SensorsState(source_us=WallClock().now_us(), devices=(GPS, IMU, HEADING)))
             await asyncio.sleep(0.2)
 
-    reporting = asyncio.create_task(report())
-    async with spawn("dashboard"):
+    async with at_work(report()), spawn("dashboard"):
         watched = await watch(browser, config, *size)
         page = watched.page
         await until(page, f"{STRIP}.querySelectorAll('[data-status]:not([hidden])').length === 3")
@@ -63,4 +63,3 @@ async def test_each_device_is_named_with_its_status_and_what_is_wrong(
         await until(page, f"{STRIP}.textContent.includes('the sensor process is silent')")
         assert not await page.evaluate(f"{STRIP}.querySelector('[data-status=ok]')")
         assert watched.errors == []
-    reporting.cancel()

@@ -14,6 +14,7 @@ from paani import keys
 from paani import messages as m
 from paani.clock import WallClock
 from paani.config import Config
+from tests.at_work import at_work
 from tests.browser.conftest import Boat
 from tests.browser.guidance import guiding
 from tests.browser.test_indicator_strip import SHOWS
@@ -54,9 +55,8 @@ async def talkative(open_as: OpenAs, private_sets: tuple[str, ...]) -> AsyncIter
             )  # fmt: skip
             await asyncio.sleep(0.2)
 
-    reporting = asyncio.create_task(report())
-    yield
-    reporting.cancel()
+    async with at_work(report()):
+        yield
 
 
 @pytest.fixture

@@ -13,6 +13,7 @@ from paani import keys
 from paani import messages as m
 from paani.clock import WallClock
 from paani.config import Config
+from tests.at_work import at_work
 from tests.browser.conftest import Boat
 from tests.browser.test_page import until, watch
 from tests.conftest import OpenAs, Spawn
@@ -42,8 +43,7 @@ async def test_the_strip_shows_parameters_in_force_and_on_trial(
             publisher.put(msgspec.structs.replace(report, source_us=WallClock().now_us()))
             await asyncio.sleep(0.1)
 
-    speaking = asyncio.create_task(speak())
-    async with spawn("dashboard"):
+    async with at_work(speak()), spawn("dashboard"):
         watched = await watch(browser, config)
         page = watched.page
         await until(page, "paani.overlay.mask_seq !== null")
@@ -93,7 +93,6 @@ async def test_the_strip_shows_parameters_in_force_and_on_trial(
         publisher.new_epoch()
         await until(page, f"!({SHOWN}) && {log}.includes('the advisor restarted: back at its configuration')")
         assert watched.errors == []
-    speaking.cancel()
 
 
 async def test_the_strip_fits_a_phone(browser: Any, boat: Boat, open_as: OpenAs, spawn: Spawn, config: Config) -> None:

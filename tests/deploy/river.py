@@ -19,6 +19,7 @@ from paani.bus import Bus
 from paani.clock import MonotonicClock
 from paani.config import Config, load_config
 from tests.arming import arm_on_page
+from tests.at_work import at_work
 from tests.bus_peers import joined, until
 from tests.conftest import find_free_port
 from tests.deploy.engine import Engine
@@ -172,12 +173,10 @@ async def _wired(mcu: Emulator, socket: Path) -> AsyncIterator[None]:
     router = FakeRouter(socket, random.Random(1))
     await router.start()
     await asyncio.to_thread(socket.chmod, 0o666)  # as the board's own
-    wire = asyncio.create_task(pipe_to_router(mcu.guide, socket))
     try:
-        yield
+        async with at_work(pipe_to_router(mcu.guide, socket)):
+            yield
     finally:
-        wire.cancel()
-        await asyncio.gather(wire, return_exceptions=True)
         await router.stop()
 
 

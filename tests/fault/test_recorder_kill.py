@@ -25,6 +25,7 @@ from paani.logs.folder import recordings
 from paani.logs.layout import MAGIC
 from paani.logs.reader import open_log
 from paani.logs.repair import is_finished, repair
+from tests.at_work import at_work
 from tests.conftest import OpenAs, wait_alive
 from tests.unit.paani.logs.small_logs import JPEG
 
@@ -104,22 +105,20 @@ async def test_a_killed_recorder_loses_at_most_a_second(
     rng = random.Random(1)
     folder = tmp_path / "recordings"
     observer = await open_as("observer")
-    speaking = asyncio.create_task(
-        speak(await open_as("plant"), await open_as("camera"), await open_as("localization"))
-    )
     killed: list[Killed] = []
-    for number in range(KILLS):
-        states = observer.queue(keys.RECORDER_STATE)
-        # Every other one also ends and begins parts all the time, to be killed in the midst of that.
-        async with recorder(
-            observer, folder, (*private_sets, *(("recorder.part_s=0.7",) if number % 2 else ()))
-        ) as own:
-            state = await states.get()
-            await asyncio.sleep(1.0 + 1.5 * rng.random())
-            os.kill(own.pid, signal.SIGKILL)
-            killed.append(Killed(state.file, CLOCK.now_us()))
-            await own.wait()
-    speaking.cancel()
+    speaking = speak(await open_as("plant"), await open_as("camera"), await open_as("localization"))
+    async with at_work(speaking):
+        for number in range(KILLS):
+            states = observer.queue(keys.RECORDER_STATE)
+            # Every other one also ends and begins parts all the time, to be killed in the midst of that.
+            async with recorder(
+                observer, folder, (*private_sets, *(("recorder.part_s=0.7",) if number % 2 else ()))
+            ) as own:
+                state = await states.get()
+                await asyncio.sleep(1.0 + 1.5 * rng.random())
+                os.kill(own.pid, signal.SIGKILL)
+                killed.append(Killed(state.file, CLOCK.now_us()))
+                await own.wait()
     lost = await asyncio.to_thread(judge, folder, killed)
     files = len(await asyncio.to_thread(recordings, folder))
     print(

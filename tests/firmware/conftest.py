@@ -9,6 +9,7 @@ from collections.abc import AsyncIterator
 import pytest
 
 from paani.microcontroller.caller import CallError, McuCaller
+from tests.at_work import at_work
 from tests.firmware.emulator import Emulator, open_emulator
 
 CONNECT_TIMEOUT_S = 10.0
@@ -18,17 +19,13 @@ CONNECT_TIMEOUT_S = 10.0
 async def open_caller(address: str, kind: int) -> AsyncIterator[McuCaller]:
     """A caller on the line, once the microcontroller answers it."""
     caller = McuCaller(address, kind)
-    running = asyncio.create_task(caller.run())
-    try:
+    async with at_work(caller.run()):
         async with asyncio.timeout(CONNECT_TIMEOUT_S):
             while caller.status is None or caller.answered == 0:
                 with contextlib.suppress(CallError):
                     await caller.call("paani_status")
                 await asyncio.sleep(0.01)
         yield caller
-    finally:
-        running.cancel()
-        await asyncio.gather(running, return_exceptions=True)
 
 
 @pytest.fixture(params=["tcp", "pty"])

@@ -23,6 +23,7 @@ from typing import Any, NamedTuple
 
 import pytest
 
+from tests.at_work import at_work
 from tests.conftest import find_free_port
 from tests.places import ROOT
 
@@ -184,7 +185,6 @@ async def open_emulator(*, pty: bool = False, paper: bool = False) -> AsyncItera
         stdout=asyncio.subprocess.PIPE,
         stderr=asyncio.subprocess.DEVNULL,
     )
-    listening: asyncio.Task[None] | None = None
     emulator: Emulator | None = None
     try:
         if pty:
@@ -193,16 +193,13 @@ async def open_emulator(*, pty: bool = False, paper: bool = False) -> AsyncItera
             guide, thrust = (f"socket://127.0.0.1:{port}" for port in ports[:2])
         emulator = Emulator(process, guide, thrust)
         await emulator._open(ports[3], ports[2])
-        listening = asyncio.create_task(emulator._hear_bench())
-        await emulator.wait_for_pins(lambda pins: True, START_TIMEOUT_S)
-        yield emulator
+        async with at_work(emulator._hear_bench()):
+            await emulator.wait_for_pins(lambda pins: True, START_TIMEOUT_S)
+            yield emulator
     finally:
         if process.returncode is None:
             process.terminate()
         await process.communicate()
-        if listening is not None:
-            listening.cancel()
-            await asyncio.gather(listening, return_exceptions=True)
         for stream in (emulator._bench, emulator._control) if emulator is not None else ():
             if stream is not None:
                 stream[1].close()

@@ -10,6 +10,7 @@ from pathlib import Path
 from paani.messages import Direction, McuState
 from paani.microcontroller.payloads import McuStatus
 from paani.microcontroller.rpc import MessageScanner, Notification, Response
+from tests.at_work import at_work
 from tests.mcu_peer import served
 
 STILL = (Direction.STOP, Direction.NO_DATA)
@@ -62,14 +63,11 @@ async def listening_on(line: str) -> AsyncIterator[LineListener]:
     host, _, port = line.removeprefix("socket://").rpartition(":")
     reader, writer = await asyncio.open_connection(host, int(port))
     listener = LineListener(reader, writer)
-    listening = asyncio.create_task(listener.listen())
     try:
-        async with served(listener.serve) as own_port:
+        async with at_work(listener.listen()), served(listener.serve) as own_port:
             listener.address = f"socket://127.0.0.1:{own_port}"
             yield listener
     finally:
-        listening.cancel()
-        await asyncio.gather(listening, return_exceptions=True)
         writer.close()
 
 

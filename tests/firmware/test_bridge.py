@@ -11,6 +11,7 @@ import pytest
 from paani import messages as m
 from paani.microcontroller.caller import McuCaller
 from paani.microcontroller.payloads import INDICATION, Guide
+from tests.at_work import at_work
 from tests.conftest import OpenAs, Spawn
 from tests.fake_router import FakeRouter
 from tests.firmware.emulator import open_emulator
@@ -95,29 +96,27 @@ async def test_behind_the_router_a_restart_of_it_ends_and_a_second_session_is_re
     path = tmp_path / "router.sock"
     router = FakeRouter(path, random.Random(1))
     await router.start()
-    async with open_emulator() as mcu:
-        piping = asyncio.create_task(pipe_to_router(mcu.guide, path))
-        async with bridge(spawn, open_as, f"unix:{path}", NOBODY) as loop:
-            loop.advisor.direction = m.Direction.LEFT
-            await loop.state(lambda state: state.display is m.Direction.LEFT, 30.0)
-            assert {"paani_guide", "paani_mcu"} <= router.routes
+    async with (
+        open_emulator() as mcu,
+        at_work(pipe_to_router(mcu.guide, path)),
+        bridge(spawn, open_as, f"unix:{path}", NOBODY) as loop,
+    ):
+        loop.advisor.direction = m.Direction.LEFT
+        await loop.state(lambda state: state.display is m.Direction.LEFT, 30.0)
+        assert {"paani_guide", "paani_mcu"} <= router.routes
 
-            second = McuCaller(f"unix:{path}", INDICATION)
-            calling = asyncio.create_task(second.run())
+        second = McuCaller(f"unix:{path}", INDICATION)
+        async with at_work(second.run()):
             await until(lambda: second.is_connected)
             other = Guide(direction=m.Direction.RIGHT, session=1, seq=1, lease_ms=700)
             status = await second.call("paani_guide", other.encode())
             assert (status.verdict, status.display) == (m.McuVerdict.FOREIGN_SESSION, m.Direction.LEFT)
             assert "second session refused" in second.problem
-            calling.cancel()
-            await asyncio.gather(calling, return_exceptions=True)
 
-            await router.stop()
-            await loop.state(lambda state: not state.connected)
-            await router.start()
-            await loop.state(lambda state: state.display is m.Direction.LEFT, 40.0)
-        piping.cancel()
-        await asyncio.gather(piping, return_exceptions=True)
+        await router.stop()
+        await loop.state(lambda state: not state.connected)
+        await router.start()
+        await loop.state(lambda state: state.display is m.Direction.LEFT, 40.0)
     await router.stop()
 
 

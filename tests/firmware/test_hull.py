@@ -18,6 +18,7 @@ from paani.bus import open_bus
 from paani.clock import WallClock
 from paani.config import load_config
 from tests.arming import arm_on_page
+from tests.at_work import at_work
 from tests.conftest import find_free_port
 from tests.firmware.emulator import open_emulator
 from tests.firmware.test_hardware_in_the_loop import running
@@ -44,12 +45,10 @@ async def gps() -> AsyncIterator[str]:
             os.write(far, f"${body}*{checksum:02X}\r\n".encode())
             await asyncio.sleep(0.2)
 
-    task = asyncio.create_task(speak())
     try:
-        yield f"serial:{os.ttyname(near)}@9600"
+        async with at_work(speak()):
+            yield f"serial:{os.ttyname(near)}@9600"
     finally:
-        task.cancel()
-        await asyncio.gather(task, return_exceptions=True)
         for descriptor in (far, near):
             os.close(descriptor)
 
@@ -79,21 +78,19 @@ async def test_a_hull_starts_disarmed_and_without_a_simulator(tmp_path: Path) ->
                 async for name, is_alive in bus.alive_events():
                     (alive.add if is_alive else alive.discard)(name)
 
-            watching = asyncio.create_task(watch())
             try:
-                await until(lambda: alive >= set(config.services), 20.0)
-                assert not alive & {"plant", "eye"}
-                await until(lambda: fixes.value is not None and fixes.value.producer == "sensors", 10.0)
-                await until(lambda: applied.value is not None and applied.value.zero_cause is m.ZeroCause.NOT_ARMED)
-                await until(lambda: state.value is not None)
-                assert state.value is not None
-                assert not state.value.armed
-                await arm_on_page(f"http://127.0.0.1:{page}", config.bus)
-                await until(lambda: state.value is not None and state.value.armed and state.value.enabled, 10.0)
-                assert applied.value is not None
-                assert applied.value.zero_cause is not m.ZeroCause.NONE
-                assert {pins[:2] for pins in mcu.history} == {(1500, 1500)}
+                async with at_work(watch()):
+                    await until(lambda: alive >= set(config.services), 20.0)
+                    assert not alive & {"plant", "eye"}
+                    await until(lambda: fixes.value is not None and fixes.value.producer == "sensors", 10.0)
+                    await until(lambda: applied.value is not None and applied.value.zero_cause is m.ZeroCause.NOT_ARMED)
+                    await until(lambda: state.value is not None)
+                    assert state.value is not None
+                    assert not state.value.armed
+                    await arm_on_page(f"http://127.0.0.1:{page}", config.bus)
+                    await until(lambda: state.value is not None and state.value.armed and state.value.enabled, 10.0)
+                    assert applied.value is not None
+                    assert applied.value.zero_cause is not m.ZeroCause.NONE
+                    assert {pins[:2] for pins in mcu.history} == {(1500, 1500)}
             finally:
-                watching.cancel()
-                await asyncio.gather(watching, return_exceptions=True)
                 await bus.close()

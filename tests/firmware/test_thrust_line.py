@@ -11,6 +11,7 @@ import pytest
 from paani.messages import McuState, McuVerdict
 from paani.microcontroller.caller import McuCaller
 from paani.microcontroller.payloads import THRUST, EscSettings, McuStatus, ThrustCall
+from tests.at_work import at_work
 from tests.firmware.conftest import open_caller
 from tests.firmware.emulator import Emulator
 
@@ -46,12 +47,8 @@ class Boat:
                 await self.ask()
                 await asyncio.sleep(0.05)
 
-        task = asyncio.create_task(drive())
-        try:
+        async with at_work(drive()):
             yield
-        finally:
-            task.cancel()
-            await asyncio.gather(task, return_exceptions=True)
 
     async def see(self, left_us: int, right_us: int, enable: bool) -> McuStatus:
         """Wait until the bench port, the status, and the registers behind the image's back all say this."""

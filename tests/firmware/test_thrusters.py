@@ -15,6 +15,7 @@ import pytest
 from paani import messages as m
 from paani.config import Config, load_config
 from paani_services.thrusters.service import run
+from tests.at_work import at_work
 from tests.conftest import find_free_port
 from tests.fake_router import FakeRouter
 from tests.firmware.emulator import Emulator, open_emulator
@@ -36,24 +37,13 @@ async def speaking(config: Config) -> AsyncIterator[ThrusterBus]:
     """A bus with everybody but the thrusters."""
     async with opened(config) as buses:
         bus = ThrusterBus(config, buses)
-        task = asyncio.create_task(bus.speak())
-        try:
+        async with at_work(bus.speak()):
             yield bus
-        finally:
-            task.cancel()
-            await asyncio.gather(task, return_exceptions=True)
 
 
-@contextlib.asynccontextmanager
-async def thrusters(bus: ThrusterBus) -> AsyncIterator[None]:
+def thrusters(bus: ThrusterBus) -> contextlib.AbstractAsyncContextManager[None]:
     """The process's work, within this one."""
-    task = asyncio.create_task(run(bus.buses["thrusters"], CLOCK, bus.config))
-    try:
-        yield
-        assert not task.done(), "never a crash"
-    finally:
-        task.cancel()
-        await asyncio.gather(task, return_exceptions=True)
+    return at_work(run(bus.buses["thrusters"], CLOCK, bus.config))
 
 
 @contextlib.asynccontextmanager
@@ -176,14 +166,11 @@ async def on_a_router(mcu: Emulator, path: Path) -> AsyncIterator[str]:
     host, _, port = mcu.thrust.removeprefix("socket://").partition(":")
     near = await asyncio.open_connection(host, int(port))
     far = await asyncio.open_unix_connection(path)
-    tasks = [asyncio.create_task(copy(near[0], far[1])), asyncio.create_task(copy(far[0], near[1]))]
     try:
-        await until(lambda: {"paani_thrust", "paani_esc"} <= router.routes, 15.0)
-        yield f"unix:{path}"
+        async with at_work(copy(near[0], far[1]), copy(far[0], near[1])):
+            await until(lambda: {"paani_thrust", "paani_esc"} <= router.routes, 15.0)
+            yield f"unix:{path}"
     finally:
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
         await router.stop()
         for _, writer in (near, far):
             writer.close()

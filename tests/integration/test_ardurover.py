@@ -20,8 +20,9 @@ from paani.bus import Bus
 from paani.clock import stopwatch_ms
 from paani.config import Config, load_config
 from tests.ardurover import HOLD, MANUAL, ArduRover, ardurover
+from tests.at_work import at_work
 from tests.mcu_peer import until
-from tests.thruster_bus import PULSES, ThrusterBus, at_work, opened
+from tests.thruster_bus import PULSES, ThrusterBus, opened
 
 PROGRAM = os.environ.get("PAANI_ARDUROVER", "")
 pytestmark = [

@@ -11,9 +11,10 @@ from paani import messages as m
 from paani.bus import Bus
 from paani.config import Config, load_config
 from paani_services.thrusters.service import run
+from tests.at_work import at_work
 from tests.mcu_peer import until
 from tests.rover_peer import RoverPeer
-from tests.thruster_bus import CLOCK, PULSES, ThrusterBus, at_work, opened
+from tests.thruster_bus import CLOCK, PULSES, ThrusterBus, opened
 
 pytestmark = pytest.mark.integration
 

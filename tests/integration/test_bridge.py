@@ -21,6 +21,7 @@ from paani.config import BridgeConfig
 from paani.microcontroller.payloads import UNKNOWN_RISK, Guide
 from paani.microcontroller.rpc import MessageScanner, Request, Response
 from paani_services.bridge.service import Bridge
+from tests.at_work import at_work
 from tests.conftest import OpenAs, Spawn
 from tests.fake_router import FakeRouter
 from tests.mcu_peer import McuPeer, PtyLine, notification, run_sketch, served, tcp_line, until
@@ -76,22 +77,20 @@ async def bridge(spawn: Spawn, open_as: OpenAs, line: str, peer: McuPeer, *sets:
     advisor = Advisor(await open_as("advisor"))
     observer = await open_as("observer")
     states, health = observer.queue(keys.BRIDGE_STATE, 500), observer.queue(keys.health("bridge"))
-    advising = asyncio.create_task(advisor.run())
-    async with spawn("bridge", f"bridge.line={line}", *sets):
+    async with at_work(advisor.run()), spawn("bridge", f"bridge.line={line}", *sets):
         yield Loop(peer, advisor, states, health)
-    advising.cancel()
 
 
 @contextlib.asynccontextmanager
 async def routed(path: Path, peer: McuPeer) -> AsyncIterator[FakeRouter]:
     router = FakeRouter(path, random.Random(1))
     await router.start()
-    sketch = asyncio.create_task(run_sketch(path, peer))
-    await until(lambda: "paani_guide" in router.routes)
-    yield router
-    sketch.cancel()
-    await asyncio.gather(sketch, return_exceptions=True)
-    await router.stop()
+    try:
+        async with at_work(run_sketch(path, peer)):
+            await until(lambda: "paani_guide" in router.routes)
+            yield router
+    finally:
+        await router.stop()
 
 
 @contextlib.asynccontextmanager
@@ -141,18 +140,15 @@ async def test_a_change_of_advice_does_not_wait_for_the_next_frame(open_as: Open
     peer, advisor = McuPeer(), Advisor(await open_as("advisor"))
     async with tcp_line(peer) as line:
         bridge = Bridge(await open_as("bridge"), CLOCK, BridgeConfig(line=line, rate_hz=0.1))
-        tasks = [asyncio.create_task(bridge.caller.run())]
-        await until(lambda: bridge.caller.is_connected)
-        tasks.append(asyncio.create_task(bridge.show_advice()))
-        await until(lambda: bool(peer.guides))
-        for direction in (m.Direction.STOP, m.Direction.LEFT, m.Direction.STOP):
-            advisor.put(direction)
-            async with asyncio.timeout(5.0):
-                await until(lambda direction=direction: peer.guides[-1].direction is direction)  # type: ignore[misc]  # of a default
-        assert len(peer.guides) == 4
-        for task in tasks:
-            task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
+        async with at_work(bridge.caller.run()):
+            await until(lambda: bridge.caller.is_connected)
+            async with at_work(bridge.show_advice()):
+                await until(lambda: bool(peer.guides))
+                for direction in (m.Direction.STOP, m.Direction.LEFT, m.Direction.STOP):
+                    advisor.put(direction)
+                    async with asyncio.timeout(5.0):
+                        await until(lambda direction=direction: peer.guides[-1].direction is direction)  # type: ignore[misc]  # of a default
+                assert len(peer.guides) == 4
 
 
 async def test_a_silent_advisor_is_stop_and_the_frames_go_on(spawn: Spawn, open_as: OpenAs) -> None:

@@ -18,6 +18,7 @@ from paani.bus.routing import open_router
 from paani.bus.session import MAX_BYTES
 from paani.clock import ManualClock, WallClock
 from paani.config import Config, load_config
+from tests.at_work import at_work
 from tests.conftest import OpenAs, Spawn, put_raw
 
 pytestmark = pytest.mark.integration
@@ -209,9 +210,8 @@ async def test_a_picture_is_watched_by_subscribers_and_by_those_who_pull(open_as
     observer.latest_picture(keys.MASK)
     await until(masks.is_watched)
     assert not pulled_only.is_watched()
-    pulling = asyncio.create_task(dashboard.pull_picture(keys.MASK).next())
-    await until(pulled_only.is_watched)
-    pulling.cancel()
+    async with at_work(dashboard.pull_picture(keys.MASK).next()):
+        await until(pulled_only.is_watched)
 
 
 async def test_what_is_too_large_is_dropped_and_disturbs_nobody(open_as: OpenAs) -> None:

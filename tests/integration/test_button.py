@@ -16,6 +16,7 @@ from paani.clock import WallClock
 from paani.config import ButtonConfig, Config
 from paani.thrust_adapter import ThrustAdapter
 from paani_services.button.service import run
+from tests.at_work import at_work
 from tests.conftest import OpenAs, Spawn
 from tests.integration.test_operator import Boat, boat, station
 
@@ -26,13 +27,8 @@ pytestmark = [pytest.mark.integration, pytest.mark.timeout(90)]
 @contextlib.asynccontextmanager
 async def pressing(path: Path, open_as: OpenAs, config: Config) -> AsyncIterator[None]:
     bus = await open_as(keys.BUTTON)
-    running = asyncio.ensure_future(run(bus, WallClock(), replace(config, button=ButtonConfig(line=f"level:{path}"))))
-    try:
+    async with at_work(run(bus, WallClock(), replace(config, button=ButtonConfig(line=f"level:{path}")))):
         yield
-    finally:
-        running.cancel()
-        await asyncio.wait([running])
-        assert running.cancelled()
 
 
 async def test_a_press_stops_and_nobody_arms_past_a_button_that_is_down_or_gone(

@@ -23,6 +23,7 @@ from paani_tools.fleet.fleet_file import read_fleet
 from paani_tools.fleet.page import serve_page
 from paani_tools.fleet.shore import Vessel, stop_vessels, watch_fleet
 from paani_tools.fleet.vessel_state import Contact
+from tests.at_work import at_work
 from tests.bus_peers import joined, routing, until
 from tests.conftest import find_free_port, put_raw
 
@@ -69,17 +70,9 @@ async def afloat(config: Config, latitude_deg: float = 50.1) -> AsyncIterator[No
         routing(config.bus),
         joined(config.bus, "operator") as desk,
         joined(config.bus, "localization") as estimator,
+        at_work(operator.run(desk, CLOCK, config), tell_position(estimator, latitude_deg)),
     ):
-        tasks = [
-            asyncio.create_task(operator.run(desk, CLOCK, config)),
-            asyncio.create_task(tell_position(estimator, latitude_deg)),
-        ]
-        try:
-            yield
-        finally:
-            for task in tasks:
-                task.cancel()
-            await asyncio.gather(*tasks, return_exceptions=True)
+        yield
 
 
 async def tell_position(bus: Bus, latitude_deg: float) -> None:
@@ -201,8 +194,11 @@ async def test_the_page_shows_the_vessels_and_stops_them(tmp_path: Path) -> None
     file = await asyncio.to_thread(fleet_file, tmp_path, otter, swan)
     fleet = await asyncio.to_thread(read_fleet, file)
     port = asyncio.get_running_loop().create_future()
-    async with afloat(otter), watch_fleet(fleet, CLOCK) as vessels:
-        serving = asyncio.create_task(serve_page(vessels, 0, port.set_result))
+    async with (
+        afloat(otter),
+        watch_fleet(fleet, CLOCK) as vessels,
+        at_work(serve_page(vessels, 0, port.set_result)),
+    ):
         await until(lambda: is_known(vessels[0]))
         async with aiohttp.ClientSession(f"http://127.0.0.1:{await port}") as client:
             for path in ("/", "/static/fleet.js", "/static/fleet.css", "/api/fleet"):
@@ -226,8 +222,6 @@ async def test_the_page_shows_the_vessels_and_stops_them(tmp_path: Path) -> None
                     assert (response.status, (await response.json()).get("latched")) == (status, latched)
             assert vessels[0].state.mode == "STOPPED"
             assert vessels[0].state.changed_by == "shore"
-        serving.cancel()
-        await asyncio.gather(serving, return_exceptions=True)
 
 
 async def test_the_command_lists_and_stops(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from paani.bus.routing import open_router
 from paani.clock import WallClock
 from paani.config import load_config
 from paani.errors import UserError
+from tests.at_work import at_work
 from tests.conftest import put_raw
 from tests.paani_command import paani
 
@@ -101,11 +102,10 @@ async def test_paani_stop_reaches_a_hull_whose_profile_is_not_named(private_sets
             )
             await asyncio.sleep(0.05)
 
-    answering = asyncio.create_task(answer_forever())
     try:
-        code, out, errors = await paani(private_sets, "stop")
+        async with at_work(answer_forever()):
+            code, out, errors = await paani(private_sets, "stop")
     finally:
-        answering.cancel()
         await boat.close()
         await desk.close()
         await asyncio.to_thread(router.close)

@@ -23,6 +23,7 @@ from paani.link_access import LINK
 from paani.sides import Side
 from paani_services.router.picture_exchange import connected_to_board, exchange_pictures
 from paani_services.router.route_watch import HEARD_S, WATCHED, watch_route
+from tests.at_work import at_work
 from tests.bus_peers import joined, routing, until
 from tests.conftest import find_free_port, put_raw
 
@@ -77,15 +78,14 @@ async def require_crossing(sides: Sides, controller: Bus) -> None:
         joined(sides.host, OBSERVER) as on_host,
     ):
         alive: set[str] = set()
-        following = asyncio.create_task(follow(on_host, alive))
-        with advisor.alive():
-            seen, commanded = on_host.latest(keys.TRACKS), on_board.latest(keys.THRUST)
-            written, ordered = advisor.publisher(keys.TRACKS), controller.publisher(keys.THRUST)
-            await until(lambda: seen.received > 2, lambda: written.put(tracks()))
-            await until(lambda: commanded.received > 2, lambda: ordered.put(thrust()))
-            await until(lambda: "advisor" in alive)
-        await until(lambda: "advisor" not in alive)
-        following.cancel()
+        async with at_work(follow(on_host, alive)):
+            with advisor.alive():
+                seen, commanded = on_host.latest(keys.TRACKS), on_board.latest(keys.THRUST)
+                written, ordered = advisor.publisher(keys.TRACKS), controller.publisher(keys.THRUST)
+                await until(lambda: seen.received > 2, lambda: written.put(tracks()))
+                await until(lambda: commanded.received > 2, lambda: ordered.put(thrust()))
+                await until(lambda: "advisor" in alive)
+            await until(lambda: "advisor" not in alive)
 
 
 async def follow(bus: Bus, alive: set[str]) -> None:
@@ -173,13 +173,9 @@ async def test_a_board_heard_only_beside_the_routers_is_told(sides: Sides, is_jo
                 beats.put(m.Pulse(source_us=CLOCK.now_us()))
                 await asyncio.sleep(0.1)
 
-        beating = asyncio.create_task(beat())
-        try:
+        async with at_work(beat()):
             with pytest.raises(TimeoutError if is_joined else ConnectionError):
                 await asyncio.wait_for(watch_route(direct, routed, 0.6), 3.0 if is_joined else 20.0)
-        finally:
-            beating.cancel()
-            await asyncio.wait([beating])
         await until(lambda: direct.receipt_age_s() > HEARD_S)
         with pytest.raises(TimeoutError):
             await asyncio.wait_for(watch_route(direct, routed, 0.4), 1.5)
@@ -195,21 +191,17 @@ async def test_pictures_are_pulled_across_and_look_pushed_at_home(sides: Sides) 
         joined(sides.host, "eye") as eye,
         joined(sides.host, "router") as router,
         joined(sides.host, OBSERVER) as watcher,
+        at_work(exchange_with_board(router, sides.host)),
     ):
-        exchange = asyncio.create_task(exchange_with_board(router, sides.host))
-        try:
-            taken, drawn = camera.picture_publisher(keys.PICTURE), eye.picture_publisher(keys.RENDERED)
-            seen, pulled = watcher.latest_picture(keys.PICTURE), camera.pull_picture(keys.RENDERED)
-            for index in range(3):
-                taken.put_picture(header, b"taken %d" % index)
-                assert (await asyncio.wait_for(seen.next(), 10)).data == b"taken %d" % index
-            for index in range(3):
-                drawn.put_picture(header, b"drawn %d" % index)
-                assert (await asyncio.wait_for(pulled.next(), 10)).data == b"drawn %d" % index
-            assert (await asyncio.wait_for(pulled_header(pulled, drawn, header), 10)).producer == "eye"
-        finally:
-            exchange.cancel()
-            await asyncio.wait([exchange])
+        taken, drawn = camera.picture_publisher(keys.PICTURE), eye.picture_publisher(keys.RENDERED)
+        seen, pulled = watcher.latest_picture(keys.PICTURE), camera.pull_picture(keys.RENDERED)
+        for index in range(3):
+            taken.put_picture(header, b"taken %d" % index)
+            assert (await asyncio.wait_for(seen.next(), 10)).data == b"taken %d" % index
+        for index in range(3):
+            drawn.put_picture(header, b"drawn %d" % index)
+            assert (await asyncio.wait_for(pulled.next(), 10)).data == b"drawn %d" % index
+        assert (await asyncio.wait_for(pulled_header(pulled, drawn, header), 10)).producer == "eye"
 
 
 async def pulled_header(pulled: object, drawn: object, header: m.PictureHeader) -> m.PictureHeader:
@@ -233,14 +225,12 @@ async def test_a_door_that_stays_shut_is_told_from_one_that_is_not_there(
     """Another boat's credentials: who waits is told that they are the reason."""
     other = replace(sides.board, router=sides.board.link, runtime_dir=str(tmp_path / "other"))
     await asyncio.to_thread(ensure_credentials, other)
-    opening = asyncio.create_task(open_bus(other, LINK, CLOCK))
-    await until(lambda: f"{other.router} does not answer" in caplog.text)
-    async with routing(sides.board):
-        await until(
-            lambda: f"{other.router} lets nobody in by these credentials, which are of a simulation" in caplog.text
-        )
-        opening.cancel()
-        await asyncio.wait([opening])
+    async with at_work(open_bus(other, LINK, CLOCK)):
+        await until(lambda: f"{other.router} does not answer" in caplog.text)
+        async with routing(sides.board):
+            await until(
+                lambda: f"{other.router} lets nobody in by these credentials, which are of a simulation" in caplog.text
+            )
 
 
 class ClockApart:
@@ -316,10 +306,6 @@ async def test_pictures_are_as_old_on_the_other_machine_as_they_are(sides: Sides
         stack.enter_context(operator.alive())
         taken, drawn = camera.picture_publisher(keys.PICTURE), eye.picture_publisher(keys.RENDERED)
         seen, pulled = watcher.latest_picture(keys.PICTURE), camera.pull_picture(keys.RENDERED)
-        tasks = [
-            asyncio.create_task(exchange_with_board(hands_on, sides.host)),
-            asyncio.create_task(keep_up(pulled)),
-        ]
 
         def show() -> None:
             for output, clock in ((taken, there), (drawn, CLOCK)):
@@ -330,13 +316,9 @@ async def test_pictures_are_as_old_on_the_other_machine_as_they_are(sides: Sides
         def age_s(inbox: Latest[Picture], clock: Clock) -> float:
             return float("inf") if inbox.value is None else (clock.now_us() - inbox.value.header.source_us) * 1e-6
 
-        try:
+        async with at_work(exchange_with_board(hands_on, sides.host), keep_up(pulled)):
             await until(lambda: 0.2 <= age_s(seen, CLOCK) < 2.0, show)
             await until(lambda: 0.2 <= age_s(pulled, there) < 2.0, show)
-        finally:
-            for task in tasks:
-                task.cancel()
-            await asyncio.wait(tasks)
 
 
 async def keep_up(pulled: Latest[Picture]) -> None:

@@ -17,6 +17,7 @@ from paani import messages as m
 from paani.bus import Bus, open_bus
 from paani.clock import WallClock, stopwatch_ms
 from tests.arming import arm_on_page
+from tests.at_work import at_work
 from tests.integration.mavlink_river import LINK_LOSS_S, River, river_in, until
 from tests.paani_command import paani
 from tests.transcript import Transcript
@@ -109,12 +110,10 @@ async def ground_station(link: str, transcript: Transcript) -> AsyncIterator[Gro
         system = await mavsdk.first_autopilot(timeout_s=20.0)
         assert system is not None
         station = GroundStation(system, transcript)
-        listening = asyncio.create_task(station.collect_texts())
         try:
-            yield station
+            async with at_work(station.collect_texts()):
+                yield station
         finally:
-            listening.cancel()
-            await asyncio.wait({listening})
             for plugin in (station.telemetry, station.action, station.mission, station.parameters):
                 plugin.destroy()
 
@@ -262,24 +261,23 @@ async def test_a_hand_drives_while_it_holds_the_stick_and_no_longer(river: River
         while data := await reader.read(4096):
             heard.extend(message.get_type() for message in hand.parse_buffer(data) or ())
 
-    listening = asyncio.create_task(listen())
-    await arm_on_page(river.page, river.config.bus, press=2)
-    async with asyncio.timeout(30.0):
-        while (state := await states.next()).mode is not m.DriveMode.MANUAL:
-            send(common.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
-            send(common.MAVLink_set_mode_message(1, 1, 0))
-    async with asyncio.timeout(20.0):
-        while (await applied.next()).left >= -0.01:
-            send(common.MAVLink_manual_control_message(1, 0, 0, -900, 0, 0))  # astern: no advice vetoes it
-            await asyncio.sleep(0.05)
-    async with asyncio.timeout(5.0):
-        while (state := await states.next()).mode is not m.DriveMode.IDLE:
-            send(common.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
-        while (thrust := await applied.next()).left != 0.0:
-            pass
-    assert (state.armed, thrust.right) == (True, 0.0)
-    send(common.MAVLink_command_long_message(1, 1, 400, 0, 0, 0, 0, 0, 0, 0, 0))
-    assert (await until(states.next, lambda state: state.stopped, 5.0)).by == "mavlink"
-    assert "COMMAND_ACK" in heard
-    listening.cancel()
+    async with at_work(listen()):
+        await arm_on_page(river.page, river.config.bus, press=2)
+        async with asyncio.timeout(30.0):
+            while (state := await states.next()).mode is not m.DriveMode.MANUAL:
+                send(common.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
+                send(common.MAVLink_set_mode_message(1, 1, 0))
+        async with asyncio.timeout(20.0):
+            while (await applied.next()).left >= -0.01:
+                send(common.MAVLink_manual_control_message(1, 0, 0, -900, 0, 0))  # astern: no advice vetoes it
+                await asyncio.sleep(0.05)
+        async with asyncio.timeout(5.0):
+            while (state := await states.next()).mode is not m.DriveMode.IDLE:
+                send(common.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3))
+            while (thrust := await applied.next()).left != 0.0:
+                pass
+        assert (state.armed, thrust.right) == (True, 0.0)
+        send(common.MAVLink_command_long_message(1, 1, 400, 0, 0, 0, 0, 0, 0, 0, 0))
+        assert (await until(states.next, lambda state: state.stopped, 5.0)).by == "mavlink"
+        assert "COMMAND_ACK" in heard
     writer.close()

@@ -16,6 +16,7 @@ import pytest
 from paani import keys
 from paani import messages as m
 from paani.clock import WallClock
+from tests.at_work import at_work
 from tests.conftest import OpenAs, Spawn, find_free_port
 
 common: Any = pytest.importorskip("pymavlink.dialects.v20.common", reason="needs pymavlink")
@@ -104,14 +105,13 @@ async def test_what_falls_silent_is_told_as_unknown_and_not_again(spawn: Spawn, 
             )  # fmt: skip
             await asyncio.sleep(0.05)
 
-    publishing = asyncio.create_task(publish())
     async with spawn("mavlink", f"mavlink.tcp=127.0.0.1:{tcp}", 'mavlink.udp=""'), asyncio.timeout(20.0):
-        station = await Client.connect(tcp)
-        station.send(HEARTBEAT)
-        while (await station.until("HEARTBEAT")).base_mode != 129:
-            pass
-        assert (await station.until("GLOBAL_POSITION_INT")).lat == 500_000_000
-        publishing.cancel()
+        async with at_work(publish()):
+            station = await Client.connect(tcp)
+            station.send(HEARTBEAT)
+            while (await station.until("HEARTBEAT")).base_mode != 129:
+                pass
+            assert (await station.until("GLOBAL_POSITION_INT")).lat == 500_000_000
         while (await station.until("HEARTBEAT")).base_mode != 1:
             station.send(HEARTBEAT)
         while (await station.until("SYS_STATUS")).onboard_control_sensors_health:
@@ -163,8 +163,8 @@ async def test_a_boat_armed_from_here_is_stopped_without_stations(
             states.put(m.OperatorState(source_us=CLOCK.now_us(), armed=True, stopped=False, by=by))
             await asyncio.sleep(0.1)
 
-    publishing = asyncio.create_task(publish())
-    async with spawn("mavlink", f"mavlink.link_loss_s={60 if is_told_to_end else 1}", 'mavlink.udp=""') as process:
+    links = (f"mavlink.link_loss_s={60 if is_told_to_end else 1}", 'mavlink.udp=""')
+    async with at_work(publish()), spawn("mavlink", *links) as process:
         await asyncio.sleep(1.5)  # by the process's own clock, too long without a station
         assert requests.drain() == []
         by = "mavlink"
@@ -174,7 +174,6 @@ async def test_a_boat_armed_from_here_is_stopped_without_stations(
             process.terminate()
         async with asyncio.timeout(5.0):
             assert (await requests.get()).act is m.RequestAct.STOP
-    publishing.cancel()
 
 
 async def test_mavsdk_downloads_what_is_recorded_and_sees_nothing_else(spawn: Spawn, tmp_path: Path) -> None:

@@ -21,6 +21,7 @@ from paani import messages as m
 from paani.bus import Bus, Latest
 from paani.clock import WallClock
 from paani.geometry import geodetic_from_enu
+from tests.at_work import at_work
 from tests.conftest import OpenAs, Spawn, find_free_port
 from tests.integration.mavlink_river import until
 from tests.integration.test_mavproxy import LIMIT_S, Console
@@ -85,13 +86,11 @@ async def mooring(spawn: Spawn, open_as: OpenAs) -> AsyncIterator[Mooring]:
             poses.put(replace(STILL, source_us=WallClock().now_us()))
             await asyncio.sleep(0.1)
 
-    publishing = asyncio.create_task(publish_forever())
     links = (f"mavlink.udp=127.0.0.1:{udp}", f"mavlink.tcp=127.0.0.1:{tcp}")
-    async with contextlib.AsyncExitStack() as stack:
+    async with at_work(publish_forever()), contextlib.AsyncExitStack() as stack:
         services = (spawn("operator"), spawn("navigator"), spawn("mavlink", *links))
         await asyncio.gather(*(stack.enter_async_context(service) for service in services))
         yield Mooring(await open_as("observer"), udp, tcp)
-    publishing.cancel()
 
 
 async def test_mavsdk_gives_places_to_return_to(mooring: Mooring, transcript: Transcript) -> None:

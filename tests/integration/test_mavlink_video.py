@@ -12,6 +12,7 @@ import pytest
 from paani import keys
 from paani import messages as m
 from paani.clock import WallClock
+from tests.at_work import at_work
 from tests.conftest import OpenAs, Spawn, find_free_port
 
 pytest.importorskip("pymavlink", reason="needs pymavlink")
@@ -63,10 +64,14 @@ async def test_a_player_shows_the_camera_where_mavlink_says_it_is(spawn: Spawn, 
             pictures.put_picture(header, picture_of(colour))
             await asyncio.sleep(0.1)
 
-    publishing = asyncio.create_task(publish())
     configuration = sdk.Configuration.create_with_component_type(kinds.ComponentType.GROUND_STATION)
     links = (f"mavlink.tcp=127.0.0.1:{tcp}", 'mavlink.udp=""', f"mavlink.video=127.0.0.1:{video}")
-    async with spawn("mavlink", *links), sdk.Mavsdk(configuration) as mavsdk, asyncio.timeout(60.0):
+    async with (
+        at_work(publish()),
+        spawn("mavlink", *links),
+        sdk.Mavsdk(configuration) as mavsdk,
+        asyncio.timeout(60.0),
+    ):
         await mavsdk.add_any_connection(f"tcpout://127.0.0.1:{tcp}")
         system = await mavsdk.first_autopilot(timeout_s=10.0)
         assert system is not None
@@ -77,12 +82,12 @@ async def test_a_player_shows_the_camera_where_mavlink_says_it_is(spawn: Spawn, 
         while not (uri := (await camera.get_video_stream_info(listed[0].component_id)).settings.uri):
             await asyncio.sleep(0.2)
         assert uri == f"rtsp://127.0.0.1:{video}/camera"
-        watching = asyncio.create_task(asyncio.to_thread(watch, uri))
-        await asyncio.sleep(1.0)
-        colour = GREEN
-        frames = await watching
+        async with asyncio.TaskGroup() as group:
+            watching = group.create_task(asyncio.to_thread(watch, uri))
+            await asyncio.sleep(1.0)
+            colour = GREEN
+        frames = watching.result()
         camera.destroy()
-    publishing.cancel()
     assert frames[-1].shape == (240, 320, 3)
     assert frames[-1][200, 200] == pytest.approx(GREEN, abs=4)
     assert frames[-1][60, 60] == pytest.approx((255, 255, 255), abs=4)

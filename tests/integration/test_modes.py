@@ -16,6 +16,7 @@ from paani.bus import Bus
 from paani.clock import WallClock
 from paani.messages import DriveMode, ModeRefusal
 from paani.operator_client import OperatorClient
+from tests.at_work import at_work
 from tests.conftest import OpenAs, Spawn
 
 pytestmark = [pytest.mark.integration, pytest.mark.timeout(120)]
@@ -74,11 +75,8 @@ class Lookout:
 @pytest.fixture
 async def lookout(open_as: OpenAs) -> AsyncIterator[Lookout]:
     lookout = Lookout(await open_as("advisor"), await open_as("observer"))
-    running = [asyncio.create_task(each) for each in (lookout.advise_forever(), lookout.keep_reports())]
-    yield lookout
-    for task in running:
-        task.cancel()
-    await asyncio.gather(*running, return_exceptions=True)
+    async with at_work(lookout.advise_forever(), lookout.keep_reports()):
+        yield lookout
 
 
 async def test_a_hand_drives_its_death_stops_the_boat_and_the_boat_comes_home(

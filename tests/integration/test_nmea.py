@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import socket
 
 import pytest
@@ -12,6 +11,7 @@ from pynmeagps import NMEAReader
 from paani import keys
 from paani import messages as m
 from paani.clock import WallClock
+from tests.at_work import at_work
 from tests.conftest import OpenAs, Spawn
 
 pytestmark = pytest.mark.integration
@@ -35,24 +35,20 @@ async def test_plotters_hear_where_the_boat_is(spawn: Spawn, open_as: OpenAs) ->
             )  # fmt: skip
             await asyncio.sleep(0.05)
 
-    async with spawn("nmea", listen, "nmea.rate_hz=10", "nmea.max_clients=2"):
-        publishing = asyncio.create_task(publish())
-        reader, writer = await asyncio.open_connection("127.0.0.1", port)
-        _, deaf = await asyncio.open_connection("127.0.0.1", port)
-        for plotter in (writer, deaf):
-            plotter.write(b"$GPRTE,1,1,c,go*00\r\n" * 2000)  # what a plotter says is nobody's command
-        kinds = set[str]()
-        async with asyncio.timeout(10.0):
+    async with spawn("nmea", listen, "nmea.rate_hz=10", "nmea.max_clients=2"), asyncio.timeout(10.0):
+        async with at_work(publish()):
+            reader, writer = await asyncio.open_connection("127.0.0.1", port)
+            _, deaf = await asyncio.open_connection("127.0.0.1", port)
+            for plotter in (writer, deaf):
+                plotter.write(b"$GPRTE,1,1,c,go*00\r\n" * 2000)  # what a plotter says is nobody's command
+            kinds = set[str]()
             while kinds != {"RMC", "GGA", "HDT"}:
                 message = NMEAReader.parse(await reader.readline(), validate=1)
                 if getattr(message, "status", "A") == "A" and getattr(message, "lat", 50.1) == 50.1:
                     kinds.add(message.msgID)
             third, third_writer = await asyncio.open_connection("127.0.0.1", port)
             assert await third.read() == b""  # one more than may connect
-            publishing.cancel()
-            while b"RMC,,V" not in await reader.readline():
-                pass
+        while b"RMC,,V" not in await reader.readline():
+            pass
         for end in (writer, deaf, third_writer):
             end.close()
-        with contextlib.suppress(asyncio.CancelledError):
-            await publishing

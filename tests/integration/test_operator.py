@@ -17,6 +17,7 @@ from paani.config import Config
 from paani.operator_client import OperatorClient
 from paani.runtime import runtime_dir
 from paani_services.operator.latch import LATCH_FILE
+from tests.at_work import at_work
 from tests.conftest import OpenAs, Spawn
 from tests.paani_command import paani
 
@@ -65,11 +66,8 @@ class Boat:
 @pytest.fixture
 async def boat(open_as: OpenAs) -> AsyncIterator[Boat]:
     boat = Boat(await open_as("plant"))
-    reporting = asyncio.create_task(boat.report_forever())
-    yield boat
-    reporting.cancel()
-    with contextlib.suppress(asyncio.CancelledError):
-        await reporting
+    async with at_work(boat.report_forever()):
+        yield boat
 
 
 @contextlib.asynccontextmanager

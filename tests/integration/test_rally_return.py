@@ -20,6 +20,7 @@ from paani.geometry import geodetic_from_enu
 from paani_services.operator.latch import LATCH_FILE
 from paani_services.operator.state import CLEAR
 from paani_sim.worlds.river import build_river
+from tests.at_work import at_work
 from tests.conftest import OpenAs, Spawn, find_free_port
 from tests.integration.mavlink_river import until
 from tests.integration.test_modes import SERVICES, SETS, Lookout
@@ -53,8 +54,7 @@ async def test_rtl_leads_to_the_rally_point_that_is_nearer_than_home(
     page = await open_as(keys.STATION)
     (Path(config.bus.runtime_dir) / LATCH_FILE).write_text(CLEAR)
     lookout = Lookout(await open_as("advisor"), await open_as("observer"))
-    advising = asyncio.create_task(lookout.advise_forever())
-    async with contextlib.AsyncExitStack() as stack:
+    async with at_work(lookout.advise_forever()), contextlib.AsyncExitStack() as stack:
         stack.enter_context(page.alive())
         await asyncio.gather(*(stack.enter_async_context(spawn(name, *sets)) for name in PROCESSES))
         station = await stack.enter_async_context(ground_station(f"udpin://127.0.0.1:{udp}", transcript))
@@ -76,7 +76,6 @@ async def test_rtl_leads_to_the_rally_point_that_is_nearer_than_home(
         while pose.sim_us < end_us:
             assert away_m(pose, RALLY) < HELD_M < away_m(pose, HOME)
             pose = await lookout.pose.next()
-    advising.cancel()
     code, text, _ = await paani((), "replay", str(drive), "--check")
     assert (code, text.splitlines()[-1].partition(", ")[2]) == (0, "0 differ"), text
 

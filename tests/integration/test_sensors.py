@@ -7,7 +7,7 @@ import contextlib
 import math
 import os
 import random
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import msgspec
@@ -17,6 +17,7 @@ from paani import keys
 from paani import messages as m
 from paani.bus import Bus
 from paani.messages import SensorRole, SensorStatus
+from tests.at_work import at_work
 from tests.conftest import OpenAs, Spawn
 from tests.paani_command import paani
 from tests.places import DATA
@@ -110,15 +111,6 @@ class Boat:
             await asyncio.sleep(start_s + 0.01 * self.step - loop.time())
 
 
-@contextlib.asynccontextmanager
-async def driving(boat: Boat) -> AsyncIterator[None]:
-    task = asyncio.create_task(boat.drive())
-    try:
-        yield
-    finally:
-        task.cancel()
-
-
 async def device(
     bus: Bus, role: SensorRole, until: Callable[[m.SensorDevice], bool], within_s: float
 ) -> m.SensorDevice:
@@ -151,7 +143,7 @@ async def test_a_drive_on_three_serial_lines_reaches_the_estimator(
     bus = await open_as("observer")
     async with spawn("sensors", *lines_of(terminals)), spawn("localization"):
         odometry, gps, health = bus.latest(keys.ODOMETRY), bus.latest(keys.GPS), bus.latest(keys.health("sensors"))
-        async with driving(Boat(terminals)):
+        async with at_work(Boat(terminals).drive()):
             for role, rate_hz in ((SensorRole.GPS, 5.0), (SensorRole.IMU, 100.0), (SensorRole.HEADING, 10.0)):
                 found = await device(bus, role, is_at(rate_hz), 15.0)
                 assert found.status is SensorStatus.OK
@@ -175,7 +167,7 @@ async def test_a_receiver_pulled_out_and_plugged_in_again_is_back_by_itself(
     spawn: Spawn, open_as: OpenAs, terminals: dict[str, Terminal]
 ) -> None:
     bus = await open_as("observer")
-    async with spawn("sensors", *lines_of(terminals)), driving(Boat(terminals)):
+    async with spawn("sensors", *lines_of(terminals)), at_work(Boat(terminals).drive()):
         await device(bus, SensorRole.GPS, has(SensorStatus.OK), 10.0)
         terminals["gps"].unplug()
         gone = await device(bus, SensorRole.GPS, has(SensorStatus.ABSENT), 5.0)
@@ -203,8 +195,10 @@ async def test_a_device_that_babbles_is_named_and_costs_the_others_nothing(
             terminals["gps"].write(noise)
             await asyncio.sleep(0.002)
 
-    async with spawn("sensors", *lines_of(terminals)), driving(Boat({**terminals, "gps": terminals["heading"]})):
-        babbling = asyncio.create_task(babble())
+    async with (
+        spawn("sensors", *lines_of(terminals)),
+        at_work(Boat({**terminals, "gps": terminals["heading"]}).drive(), babble()),
+    ):
         named = await device(bus, SensorRole.GPS, lambda each: "babbles" in each.note, 10.0)
         assert named.status is SensorStatus.ABSENT
         health = bus.latest(keys.health("sensors"))
@@ -212,7 +206,6 @@ async def test_a_device_that_babbles_is_named_and_costs_the_others_nothing(
         assert (await device(bus, SensorRole.IMU, has(SensorStatus.OK), 2.0)).rate_hz > 80.0
         assert health.value is not None
         assert health.value.cpu_cores < 0.5
-        babbling.cancel()
 
 
 async def test_another_baud_rate_is_told_from_silence(
@@ -221,7 +214,7 @@ async def test_another_baud_rate_is_told_from_silence(
     bus, noise = await open_as("observer"), random.Random(3)
     boat = Boat(terminals)
     boat.gps = lambda _: noise.randbytes(60)
-    async with spawn("sensors", *lines_of({"gps": terminals["gps"], "imu": terminals["imu"]})), driving(boat):
+    async with spawn("sensors", *lines_of({"gps": terminals["gps"], "imu": terminals["imu"]})), at_work(boat.drive()):
         found = await device(bus, SensorRole.GPS, has(SensorStatus.UNREADABLE), 8.0)
         assert "baud" in found.note
         boat.gps = lambda _: b""
@@ -236,7 +229,7 @@ async def test_a_receiver_that_freezes_gives_no_fixes_and_one_that_rests_does(
     bus = await open_as("observer")
     boat = Boat(terminals)
     boat.gps = lambda step: nav_pvt(10 * step, sog_mmps=20)  # at rest: one position, time goes on
-    async with spawn("sensors", *lines_of(terminals)), driving(boat):
+    async with spawn("sensors", *lines_of(terminals)), at_work(boat.drive()):
         await device(bus, SensorRole.GPS, lambda each: each.rate_hz > 4.5, 12.0)
         assert (await device(bus, SensorRole.GPS, has(SensorStatus.OK), 2.0)).withheld == 0
         frozen = nav_pvt(10 * boat.step + 100, sog_mmps=20)
@@ -290,7 +283,7 @@ async def test_paani_sensors_shows_what_each_says_and_what_is_missing(
 ) -> None:
     bus = await open_as("observer")
     terminals["heading"].unplug()
-    async with spawn("sensors", *lines_of(terminals)), driving(Boat(terminals)):
+    async with spawn("sensors", *lines_of(terminals)), at_work(Boat(terminals).drive()):
         await device(bus, SensorRole.IMU, lambda each: each.rate_hz > 90.0, 10.0)
         code, out, errors = await paani(private_sets, "sensors", "--for", "2.5")
         assert (code, errors) == (1, "")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable, Coroutine
 from typing import Any
 
 import pytest
@@ -16,11 +16,12 @@ from paani.config import Config
 from paani_services.advisor.service import run as advisor
 from paani_services.controller.service import run as controller
 from paani_services.navigator.service import run as navigator
+from tests.at_work import at_work
 from tests.conftest import OpenAs
 from tests.unit.paani_services.advisor.advisor_evidence import CLEAR
 
 pytestmark = pytest.mark.integration
-Run = Callable[[Bus, Clock, Config], Awaitable[None]]
+Run = Callable[[Bus, Clock, Config], Coroutine[Any, Any, None]]
 ADVICE = m.Advisory(source_us=1, direction=m.Direction.STOP, reason=m.Reason.NO_SAFE_SIDE)
 ORDER = m.NavCommand(source_us=1, enable=False, heading_rad=0.0, speed_mps=0.0)
 
@@ -38,13 +39,9 @@ async def test_a_stop_is_not_lost_in_a_wake_up(
     service: str, run: Run, topic: keys.Topic[Any], message: m.Message, turns: int, open_as: OpenAs, config: Config
 ) -> None:
     bus = await open_as(service)
-    running = asyncio.ensure_future(run(bus, WallClock(), config))
-    await asyncio.sleep(0.15)
-    inbox = next(inbox for each, inbox in bus.inputs if each is topic)
-    inbox.offer(message)  # type: ignore[attr-defined]  # a `Latest`
-    for _ in range(turns):
-        await asyncio.sleep(0)
-    running.cancel()
-    done, _ = await asyncio.wait([running], timeout=3)
-    assert done
-    assert running.cancelled()
+    async with asyncio.timeout(3.0), at_work(run(bus, WallClock(), config)):
+        await asyncio.sleep(0.15)
+        inbox = next(inbox for each, inbox in bus.inputs if each is topic)
+        inbox.offer(message)  # type: ignore[attr-defined]  # a `Latest`
+        for _ in range(turns):
+            await asyncio.sleep(0)

@@ -16,9 +16,10 @@ from paani.clock import stopwatch_ms
 from paani.config import Config, load_config
 from paani.errors import UserError
 from paani_services.thrusters.service import run
+from tests.at_work import at_work
 from tests.mcu_peer import PtyLine, until
 from tests.thrust_peer import BATTERY, ESTOP, RECEIVER, ThrustPeer
-from tests.thruster_bus import CLOCK, PULSES, ThrusterBus, at_work, opened
+from tests.thruster_bus import CLOCK, PULSES, ThrusterBus, opened
 
 pytestmark = pytest.mark.integration
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import itertools
 from collections.abc import AsyncIterator
 from typing import Any
@@ -19,6 +18,7 @@ from paani.clock import WallClock
 from paani.config import Config, load_config
 from paani.decider import Input, decider_of
 from tests.arming import arm_on_page, headers_of, hold_on_page
+from tests.at_work import at_work
 from tests.conftest import OpenAs, Spawn, find_free_port, put_raw
 from tests.paani_command import paani
 from tests.unit.paani_services.advisor.advisor_evidence import water
@@ -42,11 +42,8 @@ async def perception(open_as: OpenAs) -> AsyncIterator[Bus]:
             evidence.put(msgspec.structs.replace(BETWEEN, source_us=CLOCK.now_us(), frame_seq=seq))
             await asyncio.sleep(0.1)
 
-    speaking = asyncio.create_task(speak())
-    yield bus
-    speaking.cancel()
-    with contextlib.suppress(asyncio.CancelledError):
-        await speaking
+    async with at_work(speak()):
+        yield bus
 
 
 async def until(inbox: Any, wanted: Any) -> Any:
@@ -124,11 +121,13 @@ async def test_nobody_arms_while_a_request_waits_for_the_advisor(spawn: Spawn, c
     page = f"http://127.0.0.1:{config.dashboard.port}"
     async with spawn("operator"), spawn("dashboard"), aiohttp.ClientSession() as client:
         ours = await asyncio.to_thread(headers_of, page, config.bus)
-        asking = asyncio.create_task(client.post(f"{page}/api/tune/promote", json={"proposal": "7f3a"}, headers=ours))
-        await asyncio.sleep(0.5)
-        status, text = await hold_on_page(page, config.bus, press=1)
-        assert (status, "a tuning request waits" in text) == (409, True)
-        async with await asking as answer:
+        async with asyncio.TaskGroup() as group:
+            request = client.post(f"{page}/api/tune/promote", json={"proposal": "7f3a"}, headers=ours)
+            asking = group.create_task(request)  # ended with the group where that fails
+            await asyncio.sleep(0.5)
+            status, text = await hold_on_page(page, config.bus, press=1)
+            assert (status, "a tuning request waits" in text) == (409, True)
+        async with asking.result() as answer:
             assert (answer.status, (await answer.json())["field"]) == (503, keys.SHADOW.name)
         await arm_on_page(page, config.bus, press=2)
 

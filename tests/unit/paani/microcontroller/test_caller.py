@@ -15,6 +15,7 @@ from paani.microcontroller import caller as caller_module
 from paani.microcontroller.caller import CallError, McuCaller
 from paani.microcontroller.payloads import INDICATION, THRUST, Guide, McuStatus, append_crc
 from paani.microcontroller.rpc import Request, Response, encode_response
+from tests.at_work import at_work
 from tests.conftest import find_free_port
 from tests.mcu_peer import McuPeer, PtyLine, boot_messages, notification, served, tcp_line, until
 
@@ -24,13 +25,8 @@ GUIDE = Guide(direction=Direction.LEFT, session=7, seq=1, lease_ms=700).encode()
 @contextlib.asynccontextmanager
 async def running(address: str) -> AsyncIterator[McuCaller]:
     caller = McuCaller(address, INDICATION)
-    task = asyncio.create_task(caller.run())
-    try:
+    async with at_work(caller.run()):
         yield caller
-    finally:
-        task.cancel()
-        with contextlib.suppress(asyncio.CancelledError):
-            await task
 
 
 @contextlib.asynccontextmanager
@@ -123,12 +119,12 @@ async def test_a_refusal_is_named(verdict: McuVerdict, problem: str) -> None:
 async def test_one_call_is_outstanding_at_a_time() -> None:
     peer = McuPeer()
     peer.delay_s = 0.02
-    async with connected(peer) as caller:
-        calls = [asyncio.create_task(caller.call("paani_guide", GUIDE)) for _ in range(4)]
+    async with connected(peer) as caller, asyncio.TaskGroup() as calls:
+        for _ in range(4):
+            calls.create_task(caller.call("paani_guide", GUIDE))
         await until(lambda: len(peer.calls) == 1)
         await asyncio.sleep(0.005)
         assert len(peer.calls) == 1
-        await asyncio.gather(*calls)
     assert [call.id for call in peer.calls if isinstance(call, Request)] == [1, 2, 3, 4]
 
 
@@ -203,14 +199,15 @@ async def test_a_device_that_was_pulled_out_is_named_and_used_again_when_it_is_b
 async def test_a_line_that_breaks_during_a_call_ends_it_at_once() -> None:
     peer = McuPeer()
     peer.delay_s = 10.0
-    async with tcp_line(peer) as address, running(address) as caller:
-        await until(lambda: caller.is_connected)
-        call = asyncio.create_task(caller.call("paani_guide", GUIDE))
-        await until(lambda: bool(peer.calls))
-        assert caller._port is not None
-        await caller._port.close()
+    async with connected(peer) as caller:
+
+        async def close() -> None:
+            await until(lambda: bool(peer.calls))
+            assert caller._port is not None
+            await caller._port.close()
+
         with pytest.raises(CallError, match="closed"):
-            await call
+            await asyncio.gather(caller.call("paani_guide", GUIDE), close())
 
 
 async def test_a_line_that_is_not_to_be_had_is_tried_again_without_haste() -> None:

@@ -16,6 +16,7 @@ from paani.keys import STATION
 from paani_services.operator import state as op
 from paani_services.operator.console import Console
 from paani_services.operator.latch import LATCH_FILE, read_latch, write_latch
+from tests.at_work import at_work
 
 EPOCH = 5
 
@@ -216,11 +217,10 @@ async def test_the_order_is_published_before_the_word_that_arms_and_a_silent_han
     assert published[armed].mode_ordered
     await desk.order(m.RequestAct.MODE, 91, m.DriveMode.MANUAL)
     await desk.order(m.RequestAct.DRIVE, 92)
-    watching = asyncio.create_task(desk.console.watch_wheel())
-    await asyncio.sleep(0)
-    assert desk.last_mode() is m.DriveMode.MANUAL
-    desk.clock.advance(0.31)
-    await asyncio.sleep(0.05)
-    watching.cancel()
+    async with at_work(desk.console.watch_wheel()):
+        await asyncio.sleep(0)
+        assert desk.last_mode() is m.DriveMode.MANUAL
+        desk.clock.advance(0.31)
+        await asyncio.sleep(0.05)
     assert [word for word in published if isinstance(word, m.OperatorOrder)][-1].mode is m.DriveMode.IDLE
     assert desk.last_mode() is m.DriveMode.IDLE

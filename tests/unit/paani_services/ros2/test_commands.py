@@ -14,6 +14,7 @@ from paani.bus import Queue
 from paani.clock import ManualClock
 from paani_services.ros2 import schemas
 from paani_services.ros2.commands import batches, stick_of
+from tests.at_work import at_work
 
 FULL_MPS, FULL_RADPS = 0.6, 0.35
 
@@ -70,11 +71,8 @@ async def test_a_flood_leaves_the_loop_to_others() -> None:
         async for _ in batches(Flood(ManualClock(), 16)):
             pass
 
-    reading = asyncio.create_task(read())
-    await asyncio.sleep(0)
-    reading.cancel()
-    with pytest.raises(asyncio.CancelledError):
-        await reading
+    async with at_work(read()):
+        await asyncio.sleep(0)
 
 
 async def test_a_batch_is_what_waits_in_its_order() -> None:

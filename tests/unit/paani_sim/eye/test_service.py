@@ -23,6 +23,7 @@ from paani_sim.eye.gl import Context
 from paani_sim.eye.service import open_camera, render_jpeg, run
 from paani_sim.worlds import Fault, FaultKind
 from paani_sim.worlds.load import configured_scenario
+from tests.at_work import at_work
 
 pytestmark = [pytest.mark.gl, pytest.mark.timeout(60)]
 
@@ -99,8 +100,7 @@ async def test_pose_in_picture_out(open_as: Callable[[str], Awaitable[Bus]], con
     plant, viewer = await open_as("plant"), await open_as("camera")
     poses, pictures = plant.publisher(keys.TRUE_POSE), viewer.latest_picture(keys.RENDERED)
     clock = WallClock()
-    eye = asyncio.create_task(run(await open_as("eye"), clock, config))
-    try:
+    async with at_work(run(await open_as("eye"), clock, config)):
         seen: list[Picture] = []
         sent: dict[int, float] = {}
         async with asyncio.timeout(40.0):
@@ -110,13 +110,8 @@ async def test_pose_in_picture_out(open_as: Callable[[str], Awaitable[Bus]], con
                 with contextlib.suppress(TimeoutError):
                     async with asyncio.timeout(0.05):
                         seen.append(await pictures.next())
-                assert not eye.done()
             drawing = next(each for each in threading.enumerate() if each.name.startswith("gl"))
             assert niceness(drawing.native_id) == niceness(threading.get_native_id()) + 5, "drawing alone yields"
-    finally:
-        eye.cancel()
-        with contextlib.suppress(asyncio.CancelledError):
-            await eye
     headers = [p.header for p in seen]
     assert [h.frame_seq for h in headers] == [0, 1, 2, 3]
     assert all(h.source_us in sent for h in headers)

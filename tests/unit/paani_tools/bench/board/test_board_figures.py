@@ -18,6 +18,7 @@ from paani_tools.bench.board.host_counters import HostSample
 from paani_tools.bench.board.machine import MachineIdentity
 from paani_tools.bench.board.poll import Poll, poll_board
 from paani_tools.bench.board.table import NOT_THE_BOARD, BoardRun, board_table
+from tests.at_work import at_work
 
 HOST = HostSample(
     busy_ticks=0,
@@ -255,10 +256,7 @@ async def test_an_interrupted_run_keeps_what_it_has(monkeypatch: pytest.MonkeyPa
         if made >= 2:
             two.set()
 
-    task = asyncio.create_task(poll_board(lambda: answer, StillCounters(), WallClock(), 10_000, done, note_progress))
-    await asyncio.to_thread(two.wait)
-    task.cancel()
-    with pytest.raises(asyncio.CancelledError):
-        await task
+    async with at_work(poll_board(lambda: answer, StillCounters(), WallClock(), 10_000, done, note_progress)):
+        await asyncio.to_thread(two.wait)
     assert 2 <= len(done) < 10_000
     assert board_figures(done, 10_000).answered == len(done)
