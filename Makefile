@@ -1,6 +1,6 @@
 # `make run` and `make test` set up everything they need on a fresh Debian or Ubuntu machine.
 
-# `make test EXTRAS=host,dev,train` also runs the tests that train; they need PyTorch.
+# `make test EXTRAS=host,dev,train,rerun` also runs the tests that train (they need PyTorch) and those of the Rerun view.
 
 PYTHON ?= python3
 VENV   ?= .venv

@@ -40,10 +40,10 @@ RESULTS_ALONE = {
     """,
 }  # by folder, the files that wait for results and do not watch the clock
 BESIDE = {f"tests/{folder}/test_{name}.py" for folder, names in RESULTS_ALONE.items() for name in names.split()}
-SOAK = "tests/bench/test_soak.py"  # sits out its minutes in a worker of its own, where there is a third
+SOAK = "tests/bench/test_soak.py"  # first, as it sits out its minutes and hardly computes
 STOPS_THE_BOAT = {"fault", "link"}  # folders
 WORKER = "PYTEST_XDIST_WORKER" in os.environ  # other tests run at the same time
-NICENESS = 5
+NICENESS = 10  # two workers that compute leave most of two cores to the one that watches the clock
 MAX_REASON_CHARACTERS = 300
 
 settings.register_profile("quick", max_examples=15, deadline=None)  # for `make check`; everything else tries more
@@ -83,21 +83,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    """One worker has all that watches the clock, one test after the other; the rest is shared out file by file.
-
-    Of three workers one has the soak and then ends, so that only two compute.
-    """
+    """One worker has all that watches the clock, one test after the other; the rest is shared out file by file."""
     from xdist.scheduler import LoadScopeScheduling  # noqa: PLC0415  a single process does without it
 
     class AloneFirst(LoadScopeScheduling):  # type: ignore[misc]  # xdist has no types
         def _split_scope(self, nodeid: str) -> str:
             return "alone" if is_alone(nodeid) else nodeid.partition("::")[0]
-
-        def _reschedule(self, node: Any) -> None:
-            if self.numnodes > 2 and SOAK in self.assigned_work[node]:
-                node.shutdown()  # after what it has
-            else:
-                super()._reschedule(node)
 
     config.option.loadscopereorder = False
     return AloneFirst(config, log)
