@@ -146,7 +146,7 @@ def _parser() -> argparse.ArgumentParser:
     export.add_argument(
         "--mean-with", type=Path, metavar="FILE", help="detector: the mean of the checkpoint's weights and these"
     )
-    export.add_argument("--share", type=float, default=0.5, help="of --mean-with's weights in it; 0.5 if not given")
+    export.add_argument("--share", type=float, help="of --mean-with's weights in it; 0.5 if not given")
     evaluate = commands.add_parser("evaluate", help="figures of the exported nets on held-out sequences")
     evaluate_command.add_arguments(evaluate)
     report = commands.add_parser("report", help="one page of tables, curves and pictures, outside the repository")

@@ -239,13 +239,13 @@ def export_checkpoint(
     *,
     looks_at: str | None = None,
     mean_with: Path | None = None,
-    share: float = 0.5,
+    share: float | None = None,
 ) -> None:
     """Write the ONNX file and its manifest entry, with the provenance of the chosen sources.
 
     looks_at: `HEIGHTxWIDTH` of the picture inside a segmenter. mean_with, share: a detector's earlier weights, and how
-    much of them the mean with the checkpoint's takes. Raises UserError where one is malformed or not for the network,
-    and rather than put one of the paper's networks in the place of ours.
+    much of them the mean with the checkpoint's takes (None: half). Raises UserError where one is malformed, not for the
+    network or without the other, and rather than put one of the paper's networks in the place of ours.
     """
     if net in PAPER_NETWORKS and weights.resolve() == WEIGHTS.resolve():
         raise UserError(f"--weights: {net} is not what ships there; the set `paper` lies in {PAPER_WEIGHTS}")
@@ -256,6 +256,8 @@ def export_checkpoint(
         inside = parse_size(looks_at)
     if mean_with is not None and net != "detector":
         raise UserError(f"--mean-with: {net} is no detector of ours")
+    if share is not None and mean_with is None:
+        raise UserError(f"--share {share:g}: of what? --mean-with says whose weights")
     chosen = (
         pictures.boxed_samples(held_out=True)
         if net in ("detector", "yolo11n")
@@ -274,7 +276,9 @@ def export_checkpoint(
     used = {sample.source.name for sample in pictures.samples}
     origins = tuple(read_origin(pictures.source_folder(s), s) for s in pictures.sources if s.name in used)
     licence = OPEN_LICENCE if used <= set(OPEN_TERMS) else None
-    change = None if mean_with is None else partial(take_share, path=mean_with, share=share)
+    change = None
+    if mean_with is not None:
+        change = partial(take_share, path=mean_with, share=0.5 if share is None else share)
     model = export_network(net, checkpoint, weights, inputs, origins, licence, looks_at=inside, change=change)
     sys.stdout.write(
         f"{weights / model.file}: {model.size_bytes} bytes, differs by {model.export_max_abs_diff:.1e} at most\n"

@@ -321,6 +321,8 @@ def test_a_picture_inside_is_of_a_segmenter_and_of_whole_cells(
     assert "--looks-at: detector" in (message := capsys.readouterr().err) or "multiples of 32" in message
     assert main(["export", "segmenter", "--mean-with", "earlier.onnx", *where]) == 2
     assert capsys.readouterr().err == "paani models: --mean-with: segmenter is no detector of ours\n"
+    assert main(["export", "detector", "--share", "0.25", *where]) == 2
+    assert capsys.readouterr().err == "paani models: --share 0.25: of what? --mean-with says whose weights\n"
 
 
 @pytest.mark.parametrize("net", ["paper-segmenter", "yolo11n"])
