@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import functools
 import os
 import signal
 import socket
@@ -31,16 +32,17 @@ ALONE = {"bench", "browser", "deploy", "fault", "firmware", "integration", "link
 RESULTS_ALONE = {
     "bench": "board bridge chain eyes fleet judgement recorder soak",
     "browser": """
-        exposed_page heading_verdicts indicator_strip installed legibility map_projection map_tiles models_report
-        recording_chip recordings_tab replay_page route_editor sensor_strip sizes tuning_strip
+        camera_labels exposed_page fleet_page heading_verdicts health_tab indicator_strip installed legibility
+        map_projection map_tiles mission_cells models_report recording_chip recordings_tab replay_page route_editor
+        sensor_strip sizes tuning_strip
     """,
     "integration": """
-        authority_matrix certificates claims_check cluster docs doctor examples inspect package replay stuck_detection
-        trials
+        authority_matrix certificates claims_check cluster docs doctor examples foxglove inspect package replay
+        stuck_detection trials
     """,
 }  # by folder, the files that wait for results and do not watch the clock
 BESIDE = {f"tests/{folder}/test_{name}.py" for folder, names in RESULTS_ALONE.items() for name in names.split()}
-SOAK = "tests/bench/test_soak.py"  # first, as it sits out its minutes and hardly computes
+SOAK = "tests/bench/test_soak.py"  # first, as it sits out its minutes and hardly computes; it yields to nothing
 STOPS_THE_BOAT = {"fault", "link"}  # folders
 WORKER = "PYTEST_XDIST_WORKER" in os.environ  # other tests run at the same time
 NICENESS = 10  # two workers that compute leave most of two cores to the one that watches the clock
@@ -94,14 +96,26 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     return AloneFirst(config, log)
 
 
+@functools.cache
+def yield_the_processors() -> None:
+    """Give this process and its children what others leave, those of other sessions and containers too.
+
+    Linux shares the processors among sessions first, and niceness counts within one alone (sched(7), autogroup).
+    """
+    os.setpriority(os.PRIO_PROCESS, 0, max(NICENESS, os.getpriority(os.PRIO_PROCESS, 0)))
+    with contextlib.suppress(OSError):  # the first of its session already, or a kernel without such groups
+        os.setsid()
+        Path("/proc/self/autogroup").write_text(str(NICENESS), encoding="ascii")
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> None:
     """What may run beside a test that watches the clock yields to it and to its processes.
 
     The worker that has those gets them first, and only then yields as well.
     """
-    if WORKER and not is_alone(item.nodeid):
-        os.setpriority(os.PRIO_PROCESS, 0, max(NICENESS, os.getpriority(os.PRIO_PROCESS, 0)))
+    if WORKER and not is_alone(item.nodeid) and not item.nodeid.startswith(SOAK):
+        yield_the_processors()
     if item.get_closest_marker("train"):
         import torch  # noqa: PLC0415  only these tests have it
 

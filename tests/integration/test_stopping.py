@@ -39,7 +39,7 @@ async def test_a_stop_is_not_lost_in_a_wake_up(
     service: str, run: Run, topic: keys.Topic[Any], message: m.Message, turns: int, open_as: OpenAs, config: Config
 ) -> None:
     bus = await open_as(service)
-    async with asyncio.timeout(3.0), at_work(run(bus, WallClock(), config)):
+    async with asyncio.timeout(10.0), at_work(run(bus, WallClock(), config)):
         await asyncio.sleep(0.15)
         inbox = next(inbox for each, inbox in bus.inputs if each is topic)
         inbox.offer(message)  # type: ignore[attr-defined]  # a `Latest`
