@@ -33,12 +33,12 @@ RESULTS_ALONE = {
     "bench": "board bridge chain eyes fleet judgement recorder soak",
     "browser": """
         camera_labels exposed_page fleet_page heading_verdicts health_tab indicator_strip installed legibility
-        map_projection map_tiles mission_cells models_report recording_chip recordings_tab replay_page route_editor
-        sensor_strip sizes tuning_strip
+        map_objects map_projection map_tiles mission_cells models_report recording_chip recordings_tab replay_page
+        route_editor sensor_strip sizes tuning_strip
     """,
     "integration": """
-        authority_matrix certificates claims_check cluster docs doctor examples foxglove inspect package replay
-        stuck_detection trials
+        authority_matrix certificates claims_check cluster docs doctor examples foxglove graphs inspect package
+        replay stuck_detection trials
     """,
 }  # by folder, the files that wait for results and do not watch the clock
 BESIDE = {f"tests/{folder}/test_{name}.py" for folder, names in RESULTS_ALONE.items() for name in names.split()}
