@@ -27,7 +27,7 @@ from paani_sim.trials.ledger import Ledger
 from paani_sim.trials.policies import PEERS, Policy, load_policy_config
 from paani_sim.trials.result import TrialResult
 from paani_sim.trials.run_suite import FailedDrive, find_stored_results, run_cases, run_cases_on
-from paani_sim.trials.run_trial import load_case_config, run_trial
+from paani_sim.trials.run_trial import load_case_config, require_swept_effect, run_trial
 from paani_sim.trials.seed_parts import SeedChoice, SeedPart, parse_seeds, part_of_seed
 from paani_sim.trials.suite_summary import summarise_suite
 from paani_sim.trials.summary_table import format_summary
@@ -59,6 +59,8 @@ def _run_suite(options: argparse.Namespace) -> int:
     reader = FingerprintReader(options.sets)
     for policy in options.policy:
         load_policy_config(policy, options.sets)
+    for case in {each.world: each for each in cases}.values():
+        require_swept_effect(case, options.sets)
     kept = find_stored_results(out, cases, reader)
     if kept.results:
         sys.stderr.write(f"{out}: {len(kept.results)} of {len(cases)} drives are there already\n")
@@ -157,6 +159,7 @@ def _run_one(options: argparse.Namespace) -> int:
     case = parse_case(options.one)
     if part_of_seed(case.seed) is SeedPart.VALIDATION:
         raise UserError(f"--one {options.one}: a validation seed, which is measured and never looked into")
+    require_swept_effect(case, options.sets)
     if options.record:
         from paani_sim.trials.drive_recorder import DriveRecorder  # noqa: PLC0415
 

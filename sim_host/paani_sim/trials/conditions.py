@@ -13,6 +13,7 @@ from paani_sim.worlds.generate import AS_DRAWN, Traffic
 
 VALUE_SEPARATOR = "="
 MOST_VALUES = 20  # of one sweep
+WIND = "wind_mps"
 
 
 class Condition(NamedTuple):
@@ -37,7 +38,7 @@ def _as_it_is(world: World, _value: float) -> World:
 
 CONDITIONS = {
     "current_mps": Condition(0.0, 3.0, _part("current", "speed_mps")),
-    "wind_mps": Condition(0.0, 30.0, _part("wind", "speed_mps")),
+    WIND: Condition(0.0, 30.0, _part("wind", "speed_mps")),
     "visibility_m": Condition(20.0, 1e5, _part("light", "visibility_m")),
     "rain_mmph": Condition(0.0, 100.0, _part("light", "rain_mmph")),
     "sun_elevation_deg": Condition(0.0, 90.0, _part("light", "sun_elevation_rad", math.pi / 180.0)),

@@ -8,6 +8,8 @@ import msgspec
 
 from paani.clock import process_cpu_s, stopwatch_ms
 from paani.config import Config
+from paani.errors import UserError
+from paani_sim.trials.conditions import WIND, parse_setting
 from paani_sim.trials.drive import Drive
 from paani_sim.trials.evidence_source import CameraEvidenceSource, EvidenceSource
 from paani_sim.trials.ground_truth_evidence import GroundTruthEvidenceSource
@@ -16,6 +18,7 @@ from paani_sim.trials.policies import CAMERA_POLICIES, PEERS, Policy, load_polic
 from paani_sim.trials.result import TrialResult
 from paani_sim.trials.scoring import score_drive
 from paani_sim.trials.trial_cases import TrialCase, build_scenario
+from paani_sim.vessels import load_vessel
 from paani_sim.worlds import Scenario
 
 
@@ -40,6 +43,16 @@ def load_case_config(case: TrialCase, sets: Iterable[str] = (), *, threads: bool
     if vessel == Scenario.vessel:
         return config
     return msgspec.structs.replace(config, plant=msgspec.structs.replace(config.plant, vessel=vessel))
+
+
+def require_swept_effect(case: TrialCase, sets: Iterable[str] = ()) -> None:
+    """Raises UserError where the swept condition is a wind that does not move the case's boat."""
+    if not case.swept or parse_setting(case.swept)[0] != WIND:
+        return
+    name = load_case_config(case, sets).plant.vessel or Scenario.vessel
+    windage = load_vessel(name).windage
+    if windage.frontal_area_m2 == windage.lateral_area_m2 == 0.0:
+        raise UserError(f"--sweep {WIND}: plant.vessel {name} has no windage, so wind moves it at no speed")
 
 
 def build_drive(

@@ -11,7 +11,9 @@ import pytest
 from paani.errors import UserError
 from paani_sim.trials import command
 from paani_sim.trials.conditions import CONDITIONS, MOST_VALUES, parse_sweep
+from paani_sim.trials.conditions import SWEPT as SWEPT_CONDITIONS
 from paani_sim.trials.policies import Policy
+from paani_sim.trials.run_trial import require_swept_effect
 from paani_sim.trials.sweep import plot_sweep, tabulate_sweep
 from paani_sim.trials.trial_cases import SUITES, TrialCase, build_scenario, list_cases, parse_case
 from paani_sim.worlds.generate import MAX_ENCOUNTERS
@@ -106,6 +108,8 @@ def test_the_figures_of_a_sweep_are_by_policy_and_value() -> None:
         (("--sweep", "wind_mps=" + ",".join(map(str, range(MOST_VALUES + 1)))), f"at most {MOST_VALUES}"),
         (("--sweep", "wind_mps=1", "--report", "a.html"), "--report is not for --sweep"),
         (("--svg", "a.svg"), "--svg needs --sweep"),
+        (("--sweep", "wind_mps=1"), "plant.vessel paper has no windage"),
+        (("--one", "lake@wind_mps=1:1:oracle"), "plant.vessel paper has no windage"),
         (("--one", "lake@tide=1:1:paani"), "no condition 'tide'"),
         (("--sweep", "people_factor=1.5"), "people_factor is a whole number"),
         (("--one", "imazu-01@encounters=2:1:paani"), "imazu-01 says itself what is met"),
@@ -119,3 +123,9 @@ def test_a_sweep_that_is_none_is_refused(
     with pytest.raises(UserError, match=says):
         command.main([*words])
     assert not list(tmp_path.iterdir())
+
+
+def test_a_wind_is_swept_for_a_hull_that_it_moves_and_everything_else_for_any() -> None:
+    require_swept_effect(TrialCase("lake", 1, Policy.ORACLE, swept="wind_mps=3"), ("plant.vessel=otter",))
+    for name in SWEPT_CONDITIONS.keys() - {"wind_mps"}:
+        require_swept_effect(TrialCase("lake", 1, Policy.ORACLE, swept=f"{name}={SWEPT_CONDITIONS[name].most:g}"))
