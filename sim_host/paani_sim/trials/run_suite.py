@@ -8,12 +8,10 @@ import functools
 import multiprocessing
 import os
 import platform
-import signal
 from collections.abc import Generator, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
-import cv2
 import msgspec
 
 from paani.cluster import Workers
@@ -24,12 +22,12 @@ from paani_sim.trials.fingerprint import Fingerprint, FingerprintReader
 from paani_sim.trials.result import TrialResult
 from paani_sim.trials.run_trial import ComputeEffort, run_trial
 from paani_sim.trials.trial_cases import TrialCase
+from paani_sim.trials.worker_processes import open_processes
 
 RESULTS_FOLDER, EFFORTS_FOLDER = "trials", "efforts"
 # Bounds the memory that an OpenGL driver leaks. Not the executor's own `max_tasks_per_child`: in Python 3.11 it can
 # wait for ever for the process that replaces a worker.
 DRIVES_PER_PROCESS = 32
-NICENESS = 5
 THREAD_COUNT_VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")
 
 
@@ -128,10 +126,7 @@ def run_cases_on(
 def _run_batch(
     folder: Path, cases: Sequence[TrialCase], reader: FingerprintReader, sets: Sequence[str], jobs: int
 ) -> Driven:
-    executor = concurrent.futures.ProcessPoolExecutor(
-        min(jobs, len(cases)), mp_context=multiprocessing.get_context("spawn"), initializer=_initialise_worker
-    )
-    try:
+    with open_processes(min(jobs, len(cases))) as executor:
         running = {
             executor.submit(
                 _drive_and_store, folder, DriveOrder(case, reader.fingerprint(case), tuple(sets), jobs == 1)
@@ -144,12 +139,6 @@ def _run_batch(
                 yield case, future.result()
             except BrokenProcessPool:
                 raise UserError(f"trial {case.name}: a process was killed; the same command goes on") from None
-    except BaseException:
-        for process in multiprocessing.active_children():
-            process.terminate()
-        raise
-    finally:
-        executor.shutdown(wait=True, cancel_futures=True)
 
 
 def drive_order(order: DriveOrder) -> DriveOutput | FailedDrive:
@@ -217,9 +206,3 @@ def _drive_and_store(folder: Path, order: DriveOrder) -> TrialResult | FailedDri
 @functools.cache
 def _fingerprint_reader(sets: tuple[str, ...]) -> FingerprintReader:
     return FingerprintReader(sets)
-
-
-def _initialise_worker() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
-    os.nice(NICENESS)
-    cv2.setNumThreads(1)

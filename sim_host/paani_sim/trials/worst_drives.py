@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import concurrent.futures
-import multiprocessing
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,6 +9,7 @@ from typing import Any
 import cv2
 import msgspec
 import numpy as np
+from tqdm import tqdm
 
 from paani import keys
 from paani import messages as m
@@ -22,6 +21,7 @@ from paani_sim.trials.result import TrialResult
 from paani_sim.trials.run_trial import load_case_config, run_trial
 from paani_sim.trials.track_chart import find_worst_moment_s
 from paani_sim.trials.trial_cases import TrialCase
+from paani_sim.trials.worker_processes import open_processes
 
 PICTURE_COUNT, PICTURE_SPACING_S = 6, 1.0
 BOX_BGR, TEXT_BGR = (0, 140, 255), (255, 255, 255)
@@ -52,11 +52,9 @@ def repeat_drives(
 ) -> list[RepeatedDrive]:
     """Repeat drives and write one recording each into the folder. Raises UserError where that fails."""
     folder.mkdir(parents=True, exist_ok=True)
-    with concurrent.futures.ProcessPoolExecutor(
-        min(jobs, max(1, len(cases))), mp_context=multiprocessing.get_context("spawn")
-    ) as executor:
+    with open_processes(min(jobs, max(1, len(cases)))) as executor:
         futures = [executor.submit(_repeat_drive, case, results[case], tuple(sets), folder) for case in cases]
-        return [future.result() for future in futures]
+        return [future.result() for future in tqdm(futures, unit="drive", desc="the worst again")]
 
 
 class _PictureCollector:
