@@ -29,9 +29,8 @@ def test_every_row_can_be_checked() -> None:
     assert find_faults(CLAIMS, ROOT) == []
 
 
-@pytest.mark.parametrize("claim", CLAIMS)
-def test_a_statement_is_a_sentence(claim: str) -> None:
-    assert len(CLAIMS[claim].says.split()) >= 4
+def test_a_statement_is_a_sentence() -> None:
+    assert {name: row.says for name, row in CLAIMS.items() if len(row.says.split()) < 4} == {}
 
 
 def test_every_proved_row_has_a_mutant() -> None:
