@@ -5,12 +5,14 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import AsyncIterator, Awaitable, Callable
+from typing import Any
 
 from msgspec.structs import replace
 
 from paani import keys
 from paani import messages as m
 from paani.bus import Bus
+from paani.bus.publish import Publisher
 from paani.clock import WallClock
 from tests.at_work import at_work
 
@@ -53,6 +55,13 @@ class Guidance:
                     source_us=now_us, left=thrust, right=thrust, enabled=self.order.enable, inhibits=self.order.inhibits
                 )
             )
+
+
+async def repeat(publisher: Publisher[Any], message: m.Message, period_s: float) -> None:
+    """Say the message again and again, each time as of now."""
+    while True:
+        publisher.put(replace(message, source_us=WallClock().now_us()))
+        await asyncio.sleep(period_s)
 
 
 @contextlib.asynccontextmanager

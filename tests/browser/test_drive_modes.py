@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from typing import Any
 
 import pytest
@@ -10,14 +9,12 @@ from msgspec.structs import replace
 
 from paani import keys
 from paani import messages as m
-from paani.bus import Bus
-from paani.clock import WallClock
 from paani.config import Config
 from paani.messages import DriveMode
 from tests.arming import arm_on_page
 from tests.at_work import at_work
 from tests.browser.conftest import Boat
-from tests.browser.guidance import ORDER, guiding
+from tests.browser.guidance import ORDER, guiding, repeat
 from tests.browser.test_drive import HIDE, WAIT_S, Orders, button_text, drive_manually
 from tests.browser.test_map_objects import AHEAD
 from tests.browser.test_page import until, watch
@@ -36,18 +33,11 @@ async def test_each_mode_is_ordered_on_the_page_and_the_advice_overridden_on_pur
     browser: Any, boat: Boat, open_as: OpenAs, spawn: Spawn, config: Config
 ) -> None:
     orders = Orders((await open_as("observer")).latest(keys.OPERATOR_ORDER))
-
-    async def say_home(navigator: Bus) -> None:
-        predictions = navigator.publisher(keys.PREDICTION)
-        while True:
-            predictions.put(replace(AHEAD, source_us=WallClock().now_us()))
-            await asyncio.sleep(0.2)
-
     async with (
         spawn("operator"),
         spawn("dashboard"),
         guiding(open_as) as guidance,
-        at_work(say_home(guidance.navigator)),
+        at_work(repeat(guidance.navigator.publisher(keys.PREDICTION), AHEAD, 0.2)),
     ):
         watched = await watch(browser, config)
         page = watched.page

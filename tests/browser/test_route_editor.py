@@ -13,8 +13,6 @@ from msgspec.structs import replace
 
 from paani import keys
 from paani import messages as m
-from paani.bus import Bus
-from paani.clock import WallClock
 from paani.config import Config
 from paani.fence_geometry import is_allowed
 from paani.geometry import geodetic_from_enu
@@ -23,7 +21,7 @@ from paani_services.navigator.files.geojson import read_geojson_line
 from paani_services.navigator.files.gpx import read_gpx
 from paani_services.navigator.files.map_frame import MapFrame
 from tests.at_work import at_work
-from tests.browser.guidance import guiding
+from tests.browser.guidance import guiding, repeat
 from tests.browser.test_legibility import AXE, SERIOUS, SMALL_TARGETS, SMALL_TEXT
 from tests.browser.test_map_objects import MISSION
 from tests.browser.test_page import MAP_PX_PER_M, WAIT_S, has_colour_on_map, until, watch
@@ -164,18 +162,11 @@ async def test_land_is_drawn_marked_at_its_place_and_refused_when_it_is_sent(
     origin = f"localization.origin_lat_lon_deg=[{HERE['latitude_deg']}, {HERE['longitude_deg']}]"
     poses = (await open_as("localization")).publisher(keys.ODOMETRY)
     pose = replace(m.Odometry(source_us=0, x_m=0.0, y_m=0.0, yaw_rad=0.3, surge_mps=0.0, healthy=True), **HERE)
-
-    async def publish_forever() -> None:
-        while True:
-            now_us = WallClock().now_us()
-            poses.put(replace(pose, source_us=now_us))
-            await asyncio.sleep(0.1)
-
     async with (
         spawn("operator"),
         spawn("navigator", f"navigator.land={land}", origin),
         spawn("dashboard"),
-        at_work(publish_forever()),
+        at_work(repeat(poses, pose, 0.1)),
     ):
         watched = await watch(browser, config)
         page, editor = watched.page, Editor(watched.page)
@@ -210,18 +201,11 @@ async def test_a_mission_is_drawn_checked_and_sent_as_one(
     browser: Any, open_as: OpenAs, spawn: Spawn, config: Config, tmp_path: Path
 ) -> None:
     accepted = (await open_as("observer")).latest(keys.ORDERED_MISSION)
-
-    async def publish_forever(navigator: Bus) -> None:
-        missions = navigator.publisher(keys.MISSION)
-        while True:
-            missions.put(replace(MISSION, source_us=WallClock().now_us()))
-            await asyncio.sleep(0.5)
-
     async with (
         spawn("operator"),
         spawn("dashboard"),
         guiding(open_as) as guidance,
-        at_work(publish_forever(guidance.navigator)),
+        at_work(repeat(guidance.navigator.publisher(keys.MISSION), MISSION, 0.5)),
     ):
         guidance.route = None
         assert guidance.odometry is not None
