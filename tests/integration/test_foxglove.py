@@ -213,19 +213,20 @@ def test_masks_are_coloured_and_lie_on_their_picture(drive: tuple[Viewer, Log]) 
 
 def test_positions_are_those_on_the_bus(drive: tuple[Viewer, Log]) -> None:
     viewer, log = drive
-    odometry = {each.source_us: each for each in recorded(log, keys.ODOMETRY)}
+    places: dict[int, list[complex]] = {}  # several of one instant, where a fix comes before the next IMU sample
+    for each in recorded(log, keys.ODOMETRY):
+        places.setdefault(each.source_us, []).append(complex(each.x_m, each.y_m))
     poses, chains = viewer.read("viewer/pose"), viewer.read("viewer/transforms")
     assert min(len(poses), len(chains)) > 10 * DRIVE_S
     for pose in poses:
-        there = odometry[pose.timestamp.ToMicroseconds()]
-        assert (pose.pose.position.x, pose.pose.position.y) == (there.x_m, there.y_m)
+        position = pose.pose.position
+        assert complex(position.x, position.y) in places[pose.timestamp.ToMicroseconds()]
     for chain in chains:
         to_odom, to_base, to_camera = chain.transforms
-        there = odometry[to_odom.timestamp.ToMicroseconds()]
         turn = complex(to_odom.rotation.w, to_odom.rotation.z) ** 2
         place = complex(to_odom.translation.x, to_odom.translation.y)
         place += turn * complex(to_base.translation.x, to_base.translation.y)
-        assert (place.real, place.imag) == pytest.approx((there.x_m, there.y_m), abs=1e-6)
+        assert min(abs(place - each) for each in places[to_odom.timestamp.ToMicroseconds()]) < 1e-6
         assert (to_camera.parent_frame_id, to_camera.child_frame_id) == ("base_link", "camera_optical")
     fixes = {each.source_us: each for each in recorded(log, keys.GPS)}
     for fix in viewer.read("viewer/gps"):
