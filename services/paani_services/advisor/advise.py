@@ -22,7 +22,13 @@ from paani_services.advisor.candidates import candidate_obstacles
 from paani_services.advisor.counterfactual import find_counterfactual
 from paani_services.advisor.explanation import explain_advisory
 from paani_services.advisor.frame_facts import FrameFacts, PolicyState, frame_facts, side_block_risk
-from paani_services.advisor.people import may_keep_station, nearest_ahead_m, speed_limit_mps
+from paani_services.advisor.people import (
+    may_keep_station,
+    may_keep_station_unseen,
+    nearest_ahead_m,
+    nobody_near_s,
+    speed_limit_mps,
+)
 from paani_services.advisor.policy import Decision, advised_purpose, decide, frame_components
 from paani_services.advisor.risk import ALL_EVIDENCE, LANES, lane_water, obstacles_from_tracks
 from paani_services.advisor.tracker import (
@@ -39,12 +45,16 @@ NO_DECISION = Decision(Direction.NO_DATA, Reason.NO_EVIDENCE, counterfactual=NEE
 
 
 class AdvisorState(msgspec.Struct, frozen=True):
-    """What one call leaves for the next. `evidence` is the last distinct frame that was processed."""
+    """What one call leaves for the next. `evidence` is the last distinct frame that was processed.
+
+    station_until_us: until when what the last usable picture showed allows to keep the station.
+    """
 
     tracker: TrackerState = TrackerState()
     policy: PolicyState = PolicyState()
     evidence: Evidence | None = None
     decision: Decision | None = None
+    station_until_us: int = 0
 
 
 def advise(
@@ -97,7 +107,7 @@ def _process_frame(state: AdvisorState, evidence: Evidence, config: Config) -> A
     """Track and judge one distinct frame."""
     fits = is_well_formed(evidence)
     tracker = update_tracks(state.tracker, evidence, config)
-    policy = state.policy
+    policy, station_until_us = state.policy, 0
     if evidence.usable and fits:
         water = {lane: lane_water(evidence, lane, config) for lane in LANES}
         obstacles = obstacles_from_tracks(
@@ -108,10 +118,24 @@ def _process_frame(state: AdvisorState, evidence: Evidence, config: Config) -> A
         policy, decision = decide(state.policy, facts, frame_components(facts, ALL_EVIDENCE, config), config)
         decision = msgspec.structs.replace(decision, counterfactual=find_counterfactual(facts, decision, config))
         decision = _add_people(decision, facts, config)
+        station_until_us = evidence.source_us + round(nobody_near_s(facts.obstacles, config) * 1e6)
     else:
         policy = msgspec.structs.replace(policy, clear_frames=0)  # an unusable frame interrupts a run of clear ones
         decision = _stop_for(NO_DECISION, Reason.MALFORMED_EVIDENCE if evidence.usable else Reason.UNUSABLE_IMAGE)
-    return AdvisorState(tracker, policy, evidence, decision)
+        if fits and _remembers_station(state, evidence, tracker, config):
+            station_until_us = state.station_until_us
+            decision = msgspec.structs.replace(decision, may_keep_station=True)
+    return AdvisorState(tracker, policy, evidence, decision, station_until_us)
+
+
+def _remembers_station(state: AdvisorState, evidence: Evidence, tracker: TrackerState, config: Config) -> bool:
+    """Whether the station may be kept in an unusable picture that was looked at for people, by what was seen before."""
+    if evidence.usable or state.evidence is None or evidence.frame_epoch != state.evidence.frame_epoch:
+        return False
+    if evidence.candidates is msgspec.UNSET:
+        return False
+    candidates = candidate_obstacles(evidence, tracker, config)
+    return may_keep_station_unseen(evidence.cause, state.station_until_us, evidence.source_us, candidates, config)
 
 
 def _add_people(decision: Decision, facts: FrameFacts, config: Config) -> Decision:

@@ -7,10 +7,12 @@ held. Distances are those of the box's foot where the camera is calibrated; with
 from collections.abc import Iterable
 
 from paani.config import Config
-from paani.messages import Reason
+from paani.messages import Reason, UnusableCause
 from paani_services.advisor.risk import Obstacle, lane_span, shared_width
 
 WATER_STOPS = frozenset({Reason.NO_SAFE_SIDE, Reason.NO_SIDE_UNOCCUPIED})  # for what lies on the water that is seen
+# Of a camera that sees, while what it sees is not taken for a boat's view: a hull fills the picture, for one.
+DOUBTED_VIEWS = frozenset({UnusableCause.UNFIT, UnusableCause.NO_WATER, UnusableCause.NO_HORIZON})
 MIN_GLIMPSE_PRESENCE = 0.5  # presence below which a person seen once, and no more, blocks nothing
 
 
@@ -63,10 +65,29 @@ def may_keep_station(reason: Reason, obstacles: Iterable[Obstacle], config: Conf
 
     Nobody is where everybody who counts is farther than `stop_m`; without a calibration nobody knows.
     """
-    if not config.advisor.people.use or not config.calibration.valid or reason not in WATER_STOPS:
-        return False
-    distances_m = [each.distance_m for each in obstacles if counts(each)]
-    return all(each is not None and each > config.advisor.people.stop_m for each in distances_m)
+    return reason in WATER_STOPS and nobody_near_s(obstacles, config) > 0.0
+
+
+def may_keep_station_unseen(
+    cause: UnusableCause, until_us: int, at_us: int, candidates: Iterable[Obstacle], config: Config
+) -> bool:
+    """The same for a picture that is unusable: its view alone is doubted, and what was seen before it still holds.
+
+    until_us: how long it holds, by the last usable picture. candidates: of this picture, who may be in it.
+    """
+    return cause in DOUBTED_VIEWS and at_us < until_us and nobody_near_s(candidates, config) > 0.0
+
+
+def nobody_near_s(obstacles: Iterable[Obstacle], config: Config) -> float:
+    """For how long nobody can come within `stop_m` by swimming [s]; 0 where somebody may be there already.
+
+    Nobody: neither of these, nor whoever is farther off than `ahead_m`, where somebody may be out of sight.
+    """
+    people = config.advisor.people
+    if not people.use or not config.calibration.valid:
+        return 0.0
+    distances_m = [0.0 if each.distance_m is None else each.distance_m for each in obstacles if counts(each)]
+    return max(0.0, min((*distances_m, people.ahead_m)) - people.stop_m) / people.swim_mps
 
 
 def nearest_ahead_m(obstacles: tuple[Obstacle, ...], ahead: Iterable[int]) -> float | None:

@@ -51,6 +51,15 @@ def find_candidates(
     return tuple(sorted((*unsure, *lone), key=lambda c: -c.confidence)[: config.max_count])
 
 
+def people_as_candidates(detections: tuple[Detection, ...]) -> tuple[Candidate, ...]:
+    """The people among detections that count for nothing, as their picture is unusable: somebody may be there."""
+    return tuple(
+        Candidate(kind=CandidateKind.UNSURE_BOX, confidence=d.confidence, box_xyxy=d.box_xyxy)
+        for d in detections
+        if d.label is Label.PERSON
+    )
+
+
 def is_large_enough(box: BoxXyxy) -> bool:
     """Whether somebody could be so small there: true of everything that is not before the bow."""
     return box[3] < NEAR_FOOT or box[3] - box[1] >= NEAR_HEIGHT

@@ -21,7 +21,7 @@ from paani.messages import (
     UnusableCause,
 )
 from paani_services.perception.box_decoding import decode_boxes, decode_people
-from paani_services.perception.candidates import find_candidates
+from paani_services.perception.candidates import find_candidates, people_as_candidates
 from paani_services.perception.colour_segmentation import FALLBACK_CONFIDENCE, segment_by_colour
 from paani_services.perception.corridors import CorridorEvidence, classify_cells, find_water_edge, summarise_corridors
 from paani_services.perception.ego_hull import compute_visible_fractions, is_own_hull
@@ -132,12 +132,14 @@ class Perceiver:
             segmenter_run_ms=segmentation.run_ms,
             inference_ms=self._stopwatch_ms() - checked_ms,
         )
+        candidates = self._find_candidates(found, segmentation)
         if cause is not UnusableCause.NONE:
-            return self._build_evidence(header, bgr, cause, (), None, timing, start_ms), None
+            evidence = self._build_evidence(header, bgr, cause, (), None, timing, start_ms)
+            if candidates is not msgspec.UNSET:
+                candidates = (*people_as_candidates(found.detections), *candidates)
+            return msgspec.structs.replace(evidence, candidates=candidates), None
         evidence = self._build_evidence(header, bgr, cause, found.detections, segmentation, timing, start_ms)
-        return msgspec.structs.replace(
-            evidence, roll_rad=roll_rad, candidates=self._find_candidates(found, segmentation)
-        ), segmentation.mask
+        return msgspec.structs.replace(evidence, roll_rad=roll_rad, candidates=candidates), segmentation.mask
 
     def close(self) -> None:
         """Ends the second thread."""

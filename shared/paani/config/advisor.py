@@ -118,6 +118,7 @@ class PeopleConfig(Section, frozen=True):
     slow_mps: Positive = 0.3  # half of cruise: the boat stops within 0.4 m
     uncalibrated_mps: Positive = 0.3  # as near people: how far off anything is, nobody knows
     stop_height: Fraction = 0.6  # of the picture
+    swim_mps: Positive = 1.75  # nobody swims faster for long: the record over 1,500 m is 1.73 m/s
     drift_frac: Fraction = 0.05  # of the picture, beside the centre: who is there may drift into the way
     widest_m: Positive = 3.0  # somebody on a board, or two together: what is calibrated and wider is no person
     recognised_confidence: Fraction = 0.60  # of a confirmed obstacle, which is then no person to a calibrated camera
