@@ -246,7 +246,8 @@ class Advisory(Message, frozen=True, kw_only=True):
     candidates_ahead: numbers of `Evidence.candidates`, from 1, that block the way ahead, as they may be people; unset
     where none does. person_distance_m: of the nearest of all of these, unset where no calibration tells it.
     may_keep_station: a STOP for what lies on the water, in a picture that is fit, with nobody near: thrust may hold the
-    boat where it is. Unset for every other advice.
+    boat where it is. So it may in a picture whose view alone is doubted, for as long as the last fit one tells that
+    nobody can have come near. Unset for every other advice.
     """
 
     direction: Direction

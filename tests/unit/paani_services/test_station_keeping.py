@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from paani import messages as m
-from paani.config import ControllerConfig, load_config
+from paani.config import Config, ControllerConfig, load_config
 from paani.messages import Direction, Inhibit
 from paani_services.advisor.advise import advise
-from paani_services.advisor.people import may_keep_station
+from paani_services.advisor.people import may_keep_station, nobody_near_s
 from paani_services.advisor.risk import Obstacle
 from paani_services.controller.control import ControllerInputs, ControllerState, compute_thrust
 from paani_services.navigator.navigate import navigate
@@ -27,6 +27,10 @@ CONTROLLER, NAVIGATOR = load_config().controller, load_config().navigator
 STOP_M = CALIBRATED.advisor.people.stop_m
 LAND = m.LaneEvidence(non_water=1.0, uncertainty=0.8, clear_width=0.0)
 LAND_ALL_ROUND = msgspec.structs.replace(CLEAR, left=LAND, center=LAND, right=LAND)
+PEOPLE = CALIBRATED.advisor.people
+DOUBTED = (m.UnusableCause.UNFIT, m.UnusableCause.NO_WATER, m.UnusableCause.NO_HORIZON)
+BROKEN = tuple(cause for cause in m.UnusableCause if cause not in (*DOUBTED, m.UnusableCause.NONE))
+AFTER_S = 1.0  # between two pictures
 STOPPED = msgspec.structs.replace(advice(Direction.STOP), reason=m.Reason.NO_SAFE_SIDE, may_keep_station=True)
 
 
@@ -70,10 +74,77 @@ def test_nobody_may_be_near(somebody: Obstacle, may: bool) -> None:
     assert not may_keep_station(m.Reason.NO_SAFE_SIDE, (far_off,), load_config())
 
 
-def test_an_order_that_keeps_the_station_asks_for_no_speed_and_names_its_veto() -> None:
-    _, order = navigate(
-        RUNNING, inputs(advisory=STOPPED, odometry=pose(3.0, 0.0, 0.4)), MISSION, NOW_US, 43, NAVIGATOR, CAMERA
+def unusable(cause: m.UnusableCause, *people: m.BoxXyxy) -> m.Evidence:
+    """A picture that was looked at for people, though its evidence counts for nothing."""
+    candidates = tuple(m.Candidate(kind=m.CandidateKind.UNSURE_BOX, confidence=0.5, box_xyxy=box) for box in people)
+    return msgspec.structs.replace(
+        CLEAR, usable=False, cause=cause, left=LAND, center=LAND, right=LAND, candidates=candidates
     )
+
+
+def keeps(*frames: m.Evidence, config: Config = CALIBRATED) -> list[bool]:
+    """Whether the station may be kept, for pictures that come a second apart."""
+    return [each.may_keep_station is True for each in play(list(frames), config, AFTER_S)[1]]
+
+
+@given(FRAMES, st.sampled_from(DOUBTED))
+def test_a_doubted_view_keeps_the_station_until_somebody_unseen_may_have_come(
+    frame: m.Evidence, cause: m.UnusableCause
+) -> None:
+    """Whatever the last fit picture advised, as nobody was in it; the unseen swim from where sight ends."""
+    lasts_s = (PEOPLE.ahead_m - STOP_M) / PEOPLE.swim_mps
+    count = math.ceil(lasts_s / AFTER_S) + 2
+    _, advice, _ = play([frame] + [unusable(cause)] * count, CALIBRATED, AFTER_S)
+    for number, advisory in enumerate(advice[1:], 1):
+        assert (advisory.direction, advisory.reason) == (Direction.STOP, m.Reason.UNUSABLE_IMAGE)
+        assert (advisory.may_keep_station is True) == (number * AFTER_S < lasts_s)
+
+
+@given(st.floats(STOP_M, PEOPLE.ahead_m))
+def test_the_nearer_somebody_was_the_shorter_it_lasts(distance_m: float) -> None:
+    lasts_s = nobody_near_s((person(distance_m=PEOPLE.ahead_m), person(distance_m=distance_m)), CALIBRATED)
+    assert lasts_s == pytest.approx((distance_m - STOP_M) / PEOPLE.swim_mps)
+    assert lasts_s <= nobody_near_s((), CALIBRATED)
+
+
+@pytest.mark.parametrize("broken", BROKEN)
+def test_a_camera_that_is_broken_ends_it_and_no_doubted_view_begins_it_anew(broken: m.UnusableCause) -> None:
+    doubted = unusable(m.UnusableCause.UNFIT)
+    assert keeps(CLEAR, doubted, unusable(broken), doubted) == [False, True, False, False]
+    assert keeps(doubted, doubted) == [False, False], "nothing was seen before"
+
+
+def test_a_doubted_view_keeps_no_station_where_anything_else_is_unknown() -> None:
+    doubted = unusable(m.UnusableCause.UNFIT)
+    restarted = msgspec.structs.replace(doubted, frame_epoch=2)
+    unasked = msgspec.structs.replace(doubted, candidates=msgspec.UNSET)
+    malformed = msgspec.structs.replace(doubted, left=msgspec.structs.replace(LAND, non_water=math.nan))
+    for other in (restarted, unasked, malformed):
+        assert keeps(CLEAR, other, doubted)[1:] == [False, False]
+    assert keeps(CLEAR, doubted, config=load_config()) == [False, False], "without a calibration"
+    paper = msgspec.structs.replace(PAPER, calibration=CALIBRATED.calibration)
+    assert keeps(CLEAR, doubted, config=paper) == [False, False]
+    state, _, _ = play([CLEAR, doubted], CALIBRATED)
+    assert state.evidence is not None
+    _, old, _ = advise(state, None, state.evidence.source_us + 60_000_000, CALIBRATED)
+    assert (old.reason, old.may_keep_station) == (m.Reason.STALE_EVIDENCE, msgspec.UNSET)
+
+
+def test_whoever_may_be_in_a_doubted_picture_or_was_near_before_it_ends_it() -> None:
+    near, far = (0.45, 0.60, 0.55, 1.0), (0.48, 0.44, 0.52, 0.52)
+    assert keeps(CLEAR, unusable(m.UnusableCause.UNFIT, near)) == [False, False]
+    assert keeps(CLEAR, unusable(m.UnusableCause.UNFIT, far)) == [False, True]
+    swimmer = msgspec.structs.replace(
+        CLEAR, detections=(m.Detection(label=m.Label.PERSON, confidence=0.9, box_xyxy=near),)
+    )
+    assert keeps(swimmer, unusable(m.UnusableCause.UNFIT)) == [False, False]
+
+
+@pytest.mark.parametrize("reason", [m.Reason.NO_SAFE_SIDE, m.Reason.UNUSABLE_IMAGE])
+def test_an_order_that_keeps_the_station_asks_for_no_speed_and_names_its_veto(reason: m.Reason) -> None:
+    advisory = msgspec.structs.replace(STOPPED, reason=reason)
+    given_inputs = inputs(advisory=advisory, odometry=pose(3.0, 0.0, 0.4))
+    _, order = navigate(RUNNING, given_inputs, MISSION, NOW_US, 43, NAVIGATOR, CAMERA)
     assert (order.enable, order.keeps_station, order.inhibits) == (True, True, ())
     assert (order.speed_mps, order.astern_mps) == (0.0, 0.0)
     assert order.heading_rad == pytest.approx(0.4)

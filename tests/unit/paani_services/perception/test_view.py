@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+import cv2
 import msgspec
 import numpy as np
 import pytest
 
 from paani.arrays import F32, U8
 from paani.clock import stopwatch_ms
-from paani.config import load_config
-from paani.messages import BoxXyxy, Detection, Label, PictureHeader, UnusableCause
+from paani.config import PerceptionConfig, load_config
+from paani.messages import BoxXyxy, CandidateKind, Detection, Evidence, Label, PictureHeader, UnusableCause
 from paani_services.perception.pipeline import Perceiver
 from paani_services.perception.view import judge_view
 from tests.pictures import river
 
+PICTURES = Path(__file__).parents[4] / "examples" / "pictures"
 CONFIG = load_config().perception
 ROWS, COLUMNS = 64, 80
 VISIBLE = np.ones((ROWS, COLUMNS), np.float32)
@@ -109,3 +113,39 @@ def test_a_doubted_picture_without_a_swimmer_stays_refused_and_one_that_repeats_
     finally:
         perceiver.close()
     assert causes == [UNFIT, UNFIT, UnusableCause.FROZEN, UnusableCause.FROZEN]
+
+
+@pytest.mark.parametrize("asks", [True, False])
+def test_a_doubted_picture_is_looked_at_for_people_and_no_other_unusable_one_is(asks: bool) -> None:
+    """A detector's person is a candidate of it, the vessel beside is none; whoever asks for none is told of none."""
+    looks = msgspec.structs.replace(CONFIG, candidates=msgspec.structs.replace(CONFIG.candidates, use=asks))
+    quality = msgspec.structs.replace(CONFIG.image_quality, min_fitness=1.0, sure_fitness=1.0)
+    doubting, picture = msgspec.structs.replace(looks, image_quality=quality), read_picture("boat_ahead")
+    fit, doubted, stale = (
+        perceive(config, picture, age_s) for config, age_s in ((looks, 0.0), (doubting, 0.0), (doubting, 9.0))
+    )
+    people = [each for each in fit.detections if each.label is Label.PERSON]
+    assert people
+    assert len(people) < len(fit.detections)
+    assert (doubted.cause, doubted.detections) == (UNFIT, ())
+    assert (stale.cause, stale.candidates) == (UnusableCause.STALE, msgspec.UNSET)
+    if not asks:
+        assert doubted.candidates is msgspec.UNSET
+        return
+    assert not isinstance(doubted.candidates, msgspec.UnsetType)
+    assert not isinstance(fit.candidates, msgspec.UnsetType)
+    boxes = [each.box_xyxy for each in people] + [each.box_xyxy for each in fit.candidates]
+    assert [each.box_xyxy for each in doubted.candidates] == boxes
+    assert {each.kind for each in doubted.candidates[: len(people)]} == {CandidateKind.UNSURE_BOX}
+
+
+def read_picture(name: str) -> U8:
+    return np.asarray(cv2.imread(str(PICTURES / f"{name}.jpg")), np.uint8)
+
+
+def perceive(config: PerceptionConfig, picture: U8, age_s: float) -> Evidence:
+    perceiver = Perceiver(config, stopwatch_ms)
+    try:
+        return perceiver.perceive(picture, header(0), age_s)[0]
+    finally:
+        perceiver.close()
