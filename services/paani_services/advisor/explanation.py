@@ -42,6 +42,7 @@ UNUSABLE_TEXT = {
     UnusableCause.SKEWED: "has lines of a wrong length",
     UnusableCause.FROZEN: "is frozen",
     UnusableCause.UNFIT: "is not fit to be judged",
+    UnusableCause.FILLED: "is filled by something near",
     UnusableCause.NO_WATER: "shows no water",
     UnusableCause.NO_HORIZON: "shows water to its upper edge, as no boat sees it",
     UnusableCause.STALE: "was too old to look at",

@@ -11,8 +11,9 @@ from paani.messages import Reason, UnusableCause
 from paani_services.advisor.risk import Obstacle, lane_span, shared_width
 
 WATER_STOPS = frozenset({Reason.NO_SAFE_SIDE, Reason.NO_SIDE_UNOCCUPIED})  # for what lies on the water that is seen
-# Of a camera that sees, while what it sees is not taken for a boat's view: a hull fills the picture, for one.
-DOUBTED_VIEWS = frozenset({UnusableCause.UNFIT, UnusableCause.NO_WATER, UnusableCause.NO_HORIZON})
+# The camera is sound, and what it sees is no boat's view: a hull fills the picture, for one. Any other cause may be a
+# camera that is broken.
+DOUBTED_VIEWS = frozenset({UnusableCause.FILLED, UnusableCause.NO_WATER, UnusableCause.NO_HORIZON})
 MIN_GLIMPSE_PRESENCE = 0.5  # presence below which a person seen once, and no more, blocks nothing
 
 

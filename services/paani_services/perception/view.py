@@ -6,7 +6,7 @@ from paani.arrays import F32, U8
 from paani.config import CorridorConfig, ImageQualityConfig
 from paani.messages import Detection, Label, UnusableCause
 from paani_services.perception.candidates import stands_in_water
-from paani_services.perception.corridors import MIN_VISIBLE_FRAC, WATER
+from paani_services.perception.corridors import MIN_VISIBLE_FRAC, OBSTACLE, WATER
 
 CLOSE_UP_WATER_SHARE = 0.80  # of the mask beside and below the swimmer
 
@@ -24,12 +24,14 @@ def judge_view(
 
     cause: NONE or UNFIT. mask, confidence: of the picture as it is. A swimmer near in the centre, around whom the
     mask is sure of water, makes the picture usable: refusing it would leave out whom it shows, and with somebody in the
-    centre the advice is never straight on.
+    centre the advice is never straight on. An unfit picture in which an obstacle reaches the top in most columns, as
+    the side of a vessel does, is filled by it: no evidence either, and yet no broken camera.
     """
     if shows_swimmer_close_up(mask, confidence, detections, corridors, config):
         return UnusableCause.NONE
     if cause is not UnusableCause.NONE:
-        return cause
+        is_filled = float((mask[0] == OBSTACLE).mean()) >= config.min_filled
+        return UnusableCause.FILLED if cause is UnusableCause.UNFIT and is_filled else cause
     is_water = (mask == WATER) & (visible_frac >= MIN_VISIBLE_FRAC)
     if float(is_water.mean()) < config.min_water:
         return UnusableCause.NO_WATER

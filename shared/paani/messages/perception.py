@@ -34,6 +34,7 @@ class UnusableCause(StrEnum):
     SKEWED = "skewed"
     FROZEN = "frozen"
     UNFIT = "unfit"
+    FILLED = "filled"
     NO_WATER = "no_water"
     NO_HORIZON = "no_horizon"
     STALE = "stale"

@@ -28,7 +28,7 @@ STOP_M = CALIBRATED.advisor.people.stop_m
 LAND = m.LaneEvidence(non_water=1.0, uncertainty=0.8, clear_width=0.0)
 LAND_ALL_ROUND = msgspec.structs.replace(CLEAR, left=LAND, center=LAND, right=LAND)
 PEOPLE = CALIBRATED.advisor.people
-DOUBTED = (m.UnusableCause.UNFIT, m.UnusableCause.NO_WATER, m.UnusableCause.NO_HORIZON)
+DOUBTED = (m.UnusableCause.FILLED, m.UnusableCause.NO_WATER, m.UnusableCause.NO_HORIZON)
 BROKEN = tuple(cause for cause in m.UnusableCause if cause not in (*DOUBTED, m.UnusableCause.NONE))
 AFTER_S = 1.0  # between two pictures
 STOPPED = msgspec.structs.replace(advice(Direction.STOP), reason=m.Reason.NO_SAFE_SIDE, may_keep_station=True)
@@ -109,13 +109,13 @@ def test_the_nearer_somebody_was_the_shorter_it_lasts(distance_m: float) -> None
 
 @pytest.mark.parametrize("broken", BROKEN)
 def test_a_camera_that_is_broken_ends_it_and_no_doubted_view_begins_it_anew(broken: m.UnusableCause) -> None:
-    doubted = unusable(m.UnusableCause.UNFIT)
+    doubted = unusable(m.UnusableCause.FILLED)
     assert keeps(CLEAR, doubted, unusable(broken), doubted) == [False, True, False, False]
     assert keeps(doubted, doubted) == [False, False], "nothing was seen before"
 
 
 def test_a_doubted_view_keeps_no_station_where_anything_else_is_unknown() -> None:
-    doubted = unusable(m.UnusableCause.UNFIT)
+    doubted = unusable(m.UnusableCause.FILLED)
     restarted = msgspec.structs.replace(doubted, frame_epoch=2)
     unasked = msgspec.structs.replace(doubted, candidates=msgspec.UNSET)
     malformed = msgspec.structs.replace(doubted, left=msgspec.structs.replace(LAND, non_water=math.nan))
@@ -132,12 +132,12 @@ def test_a_doubted_view_keeps_no_station_where_anything_else_is_unknown() -> Non
 
 def test_whoever_may_be_in_a_doubted_picture_or_was_near_before_it_ends_it() -> None:
     near, far = (0.45, 0.60, 0.55, 1.0), (0.48, 0.44, 0.52, 0.52)
-    assert keeps(CLEAR, unusable(m.UnusableCause.UNFIT, near)) == [False, False]
-    assert keeps(CLEAR, unusable(m.UnusableCause.UNFIT, far)) == [False, True]
+    assert keeps(CLEAR, unusable(m.UnusableCause.FILLED, near)) == [False, False]
+    assert keeps(CLEAR, unusable(m.UnusableCause.FILLED, far)) == [False, True]
     swimmer = msgspec.structs.replace(
         CLEAR, detections=(m.Detection(label=m.Label.PERSON, confidence=0.9, box_xyxy=near),)
     )
-    assert keeps(swimmer, unusable(m.UnusableCause.UNFIT)) == [False, False]
+    assert keeps(swimmer, unusable(m.UnusableCause.FILLED)) == [False, False]
 
 
 @pytest.mark.parametrize("reason", [m.Reason.NO_SAFE_SIDE, m.Reason.UNUSABLE_IMAGE])

@@ -8,6 +8,8 @@ import cv2
 import msgspec
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from paani.arrays import F32, U8
 from paani.clock import stopwatch_ms
@@ -22,7 +24,7 @@ CONFIG = load_config().perception
 ROWS, COLUMNS = 64, 80
 VISIBLE = np.ones((ROWS, COLUMNS), np.float32)
 NONE, UNFIT = UnusableCause.NONE, UnusableCause.UNFIT
-WATER, OBSTACLE = 0, 1
+WATER, OBSTACLE, SKY = 0, 1, 2
 SWIMMER = (0.45, 0.45, 0.55, 0.60)
 
 
@@ -67,7 +69,7 @@ def test_water_to_the_top_is_seen_from_above_or_has_no_horizon() -> None:
 
 def test_a_swimmer_near_in_the_centre_wins_over_doubt_and_over_the_view() -> None:
     pool = below(0)
-    assert view(below(20), UNFIT) is UNFIT
+    assert view(below(20), UNFIT) is UnusableCause.FILLED
     assert view(below(20), UNFIT, SWIMMER) is NONE
     assert view(pool, UNFIT, SWIMMER) is NONE
     assert view(pool, NONE, SWIMMER) is NONE
@@ -85,7 +87,22 @@ def test_a_swimmer_near_in_the_centre_wins_over_doubt_and_over_the_view() -> Non
     ],
 )
 def test_doubt_stays_without_a_near_swimmer_in_water_that_is_sure(box: BoxXyxy, sure: float, row: int) -> None:
-    assert view(below(row), UNFIT, box, sure) is UNFIT
+    under_the_sky = below(row)
+    under_the_sky[0] = SKY
+    assert view(under_the_sky, UNFIT, box, sure) is UNFIT
+
+
+@given(st.integers(0, COLUMNS), st.integers(1, ROWS), st.sampled_from(UnusableCause))
+def test_an_unfit_picture_that_an_obstacle_fills_is_named_and_counts_for_nothing(
+    columns: int, row: int, cause: UnusableCause
+) -> None:
+    """Up to the upper edge in half of its columns and more; whatever else is wrong with a picture stays its cause."""
+    hull = below(row)
+    hull[0, columns:] = SKY
+    if cause is not NONE:
+        is_filled = cause is UNFIT and columns >= COLUMNS / 2
+        assert view(hull, cause) is (UnusableCause.FILLED if is_filled else cause)
+    assert view(hull) is not UnusableCause.FILLED
 
 
 def header(seq: int) -> PictureHeader:
