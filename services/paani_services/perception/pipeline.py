@@ -31,7 +31,7 @@ from paani_services.perception.image_quality import ImageQualityState, check_ima
 from paani_services.perception.picture_decoding import decode_picture
 from paani_services.perception.preprocessing import letterbox_picture, lookup_tables_for, stretch_picture
 from paani_services.perception.roll_compensation import level_mask, limit_roll_rad
-from paani_services.perception.view import judge_view
+from paani_services.perception.view import is_filled, judge_view
 
 NO_SEGMENTER = "none"  # value of `perception.segmenter` for colour segmentation alone
 MIN_SLOWER_RATIO = 1.2  # of two run times; networks that take about as long keep their order, whatever one run says
@@ -79,6 +79,7 @@ class Perceiver:
         self._detector_first = config.concurrent and self._is_slower(self._detector, self._segmenter)
         self._quality = ImageQualityState()
         self._fitness = load_fitness(config, config.intra_op_threads)
+        self._filled_epoch: int | None = None  # of the last picture, where an obstacle filled it
         self._pending: list[Future[Any]] = []
         self._visible_frac: dict[tuple[int, ...], F32] = {}
 
@@ -117,6 +118,7 @@ class Perceiver:
             frame_age_ms=max(0.0, age_s) * 1e3, decode_ms=decoded_ms - start_ms, gate_ms=checked_ms - decoded_ms
         )
         if bgr is None or not self._may_be_usable(cause):
+            self._filled_epoch = None
             return self._build_evidence(header, bgr, cause, (), None, timing, start_ms), None
         if detecting:
             segmentation = self._segment(bgr, roll_rad)
@@ -124,7 +126,7 @@ class Perceiver:
         else:
             found = self._detect(bgr)
             segmentation = segmenting.result() if segmenting else self._segment(bgr, roll_rad)  # B4: in turn
-        cause = self._judge_view(cause, found, segmentation)
+        cause = self._judge_view(cause, found, segmentation, header.frame_epoch)
         timing = msgspec.structs.replace(
             timing,
             detector_ms=found.duration_ms,
@@ -171,13 +173,26 @@ class Perceiver:
         is_doubted = cause is UnusableCause.UNFIT and self._config.image_quality.swimmer_height > 0.0
         return cause is UnusableCause.NONE or is_doubted
 
-    def _judge_view(self, cause: UnusableCause, found: Found, segmentation: Segmentation) -> UnusableCause:
+    def _judge_view(self, cause: UnusableCause, found: Found, segmentation: Segmentation, epoch: int) -> UnusableCause:
+        """The cause after the mask was seen; notes whether an obstacle fills the picture, unless it is unfit."""
+        filled_epoch, self._filled_epoch = self._filled_epoch, None
         if not self._config.image_quality.enabled or segmentation.source is not SegmentationSource.LEARNED:
             return cause
-        mask, confidence = segmentation.mask, segmentation.confidence
-        visible_frac = self._visible_fractions_of(mask.shape)
-        detections, config = found.detections, self._config
-        return judge_view(cause, mask, confidence, visible_frac, detections, config.corridors, config.image_quality)
+        mask, confidence, config = segmentation.mask, segmentation.confidence, self._config
+        visible_frac, was_filled = self._visible_fractions_of(mask.shape), filled_epoch == epoch
+        cause = judge_view(
+            cause,
+            mask,
+            confidence,
+            visible_frac,
+            found.detections,
+            config.corridors,
+            config.image_quality,
+            was_filled=was_filled,
+        )
+        if cause is not UnusableCause.UNFIT and is_filled(mask, config.image_quality):
+            self._filled_epoch = epoch
+        return cause
 
     def _detect(self, bgr: U8) -> Found:
         start_ms = self._stopwatch_ms()

@@ -19,25 +19,32 @@ def judge_view(
     detections: tuple[Detection, ...],
     corridors: CorridorConfig,
     config: ImageQualityConfig,
+    *,
+    was_filled: bool = False,
 ) -> UnusableCause:
     """The cause after the mask was seen: what the image-quality check said, or that no boat has such a view.
 
     cause: NONE or UNFIT. mask, confidence: of the picture as it is. A swimmer near in the centre, around whom the
     mask is sure of water, makes the picture usable: refusing it would leave out whom it shows, and with somebody in the
-    centre the advice is never straight on. An unfit picture in which an obstacle reaches the top in most columns, as
-    the side of a vessel does, is filled by it: no evidence either, and yet no broken camera.
+    centre the advice is never straight on. An unfit picture that an obstacle fills, as it did the one before, is no
+    evidence either, and yet no broken camera, which breaks from one picture to the next.
     """
     if shows_swimmer_close_up(mask, confidence, detections, corridors, config):
         return UnusableCause.NONE
     if cause is not UnusableCause.NONE:
-        is_filled = float((mask[0] == OBSTACLE).mean()) >= config.min_filled
-        return UnusableCause.FILLED if cause is UnusableCause.UNFIT and is_filled else cause
+        is_hull = cause is UnusableCause.UNFIT and was_filled and is_filled(mask, config)
+        return UnusableCause.FILLED if is_hull else cause
     is_water = (mask == WATER) & (visible_frac >= MIN_VISIBLE_FRAC)
     if float(is_water.mean()) < config.min_water:
         return UnusableCause.NO_WATER
     if float((mask == WATER).all(axis=0).mean()) > config.max_endless:
         return UnusableCause.NO_HORIZON
     return UnusableCause.NONE
+
+
+def is_filled(mask: U8, config: ImageQualityConfig) -> bool:
+    """Whether an obstacle reaches the picture's top in `min_filled` of its columns, as the side of a vessel does."""
+    return float((mask[0] == OBSTACLE).mean()) >= config.min_filled
 
 
 def shows_swimmer_close_up(

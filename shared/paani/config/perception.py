@@ -62,7 +62,7 @@ class ImageQualityConfig(Section, frozen=True):
     sure_fitness: Fraction = 0.97
     min_water: Fraction = 0.01  # of the mask; land that fills the picture is no boat's view
     max_endless: Fraction = 0.95  # of the mask's columns that are water to the top: seen from above, or no horizon
-    min_filled: Fraction = 0.5  # of the mask's columns with an obstacle at the top: it fills an unfit picture
+    min_filled: Fraction = 0.5  # of the mask's columns with an obstacle at the top, which then fills the picture
     swimmer_height: Fraction = 0.10  # of the picture: who is in the centre wins over the network's doubt; 0: nobody
     swimmer_water_confidence: Fraction = 0.80  # of the mask where it shows water, for that
 

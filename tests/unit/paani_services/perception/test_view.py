@@ -15,6 +15,7 @@ from paani.arrays import F32, U8
 from paani.clock import stopwatch_ms
 from paani.config import PerceptionConfig, load_config
 from paani.messages import BoxXyxy, CandidateKind, Detection, Evidence, Label, PictureHeader, UnusableCause
+from paani.picture_faults import apply_fault
 from paani_services.perception.pipeline import Perceiver
 from paani_services.perception.view import judge_view
 from tests.pictures import river
@@ -29,11 +30,18 @@ SWIMMER = (0.45, 0.45, 0.55, 0.60)
 
 
 def view(
-    mask: U8, cause: UnusableCause = NONE, box: BoxXyxy | None = None, sure: float = 0.9, visible: F32 = VISIBLE
+    mask: U8,
+    cause: UnusableCause = NONE,
+    box: BoxXyxy | None = None,
+    sure: float = 0.9,
+    visible: F32 = VISIBLE,
+    *,
+    was_filled: bool = False,
 ) -> UnusableCause:
     people = () if box is None else (Detection(label=Label.PERSON, confidence=0.6, box_xyxy=box),)
     confidence = np.full(mask.shape, sure, np.float32)
-    return judge_view(cause, mask, confidence, visible, people, CONFIG.corridors, CONFIG.image_quality)
+    quality = CONFIG.image_quality
+    return judge_view(cause, mask, confidence, visible, people, CONFIG.corridors, quality, was_filled=was_filled)
 
 
 def below(row: int) -> U8:
@@ -69,7 +77,7 @@ def test_water_to_the_top_is_seen_from_above_or_has_no_horizon() -> None:
 
 def test_a_swimmer_near_in_the_centre_wins_over_doubt_and_over_the_view() -> None:
     pool = below(0)
-    assert view(below(20), UNFIT) is UnusableCause.FILLED
+    assert view(below(20), UNFIT) is UNFIT
     assert view(below(20), UNFIT, SWIMMER) is NONE
     assert view(pool, UNFIT, SWIMMER) is NONE
     assert view(pool, NONE, SWIMMER) is NONE
@@ -87,22 +95,21 @@ def test_a_swimmer_near_in_the_centre_wins_over_doubt_and_over_the_view() -> Non
     ],
 )
 def test_doubt_stays_without_a_near_swimmer_in_water_that_is_sure(box: BoxXyxy, sure: float, row: int) -> None:
-    under_the_sky = below(row)
-    under_the_sky[0] = SKY
-    assert view(under_the_sky, UNFIT, box, sure) is UNFIT
+    assert view(below(row), UNFIT, box, sure) is UNFIT
 
 
-@given(st.integers(0, COLUMNS), st.integers(1, ROWS), st.sampled_from(UnusableCause))
-def test_an_unfit_picture_that_an_obstacle_fills_is_named_and_counts_for_nothing(
-    columns: int, row: int, cause: UnusableCause
+@given(st.integers(0, COLUMNS), st.integers(1, ROWS), st.sampled_from(UnusableCause), st.booleans())
+def test_an_unfit_picture_that_an_obstacle_fills_as_the_one_before_is_named_and_counts_for_nothing(
+    columns: int, row: int, cause: UnusableCause, was_filled: bool
 ) -> None:
     """Up to the upper edge in half of its columns and more; whatever else is wrong with a picture stays its cause."""
     hull = below(row)
     hull[0, columns:] = SKY
+    judged = view(hull, cause, was_filled=was_filled)
     if cause is not NONE:
-        is_filled = cause is UNFIT and columns >= COLUMNS / 2
-        assert view(hull, cause) is (UnusableCause.FILLED if is_filled else cause)
-    assert view(hull) is not UnusableCause.FILLED
+        is_named = cause is UNFIT and was_filled and columns >= COLUMNS / 2
+        assert judged is (UnusableCause.FILLED if is_named else cause)
+    assert (judged is NONE) <= (cause is NONE)
 
 
 def header(seq: int) -> PictureHeader:
@@ -130,6 +137,30 @@ def test_a_doubted_picture_without_a_swimmer_stays_refused_and_one_that_repeats_
     finally:
         perceiver.close()
     assert causes == [UNFIT, UNFIT, UnusableCause.FROZEN, UnusableCause.FROZEN]
+
+
+def test_a_picture_is_filled_only_where_the_one_before_was() -> None:
+    """A pontoon fills a fit picture, and then one that is unfit; beside a camera that breaks from one to the next."""
+    hull, river_view = read_picture("pontoon"), read_picture("clear_water")
+    unfit = apply_fault("blur", hull, np.zeros(hull.shape[:2], np.uint8), 3, np.random.default_rng(0))[0]
+    black = np.zeros_like(hull)
+    filled, broken = UnusableCause.FILLED, UnusableCause.BLACK
+    assert causes_of(hull, unfit, unfit, hull, unfit, epochs=(1,) * 5) == [NONE, filled, filled, NONE, filled]
+    assert causes_of(unfit, unfit, epochs=(1, 2)) == [UNFIT, UNFIT]
+    assert causes_of(hull, unfit, epochs=(1, 2)) == [NONE, UNFIT]
+    assert causes_of(river_view, unfit, epochs=(1, 1)) == [NONE, UNFIT]
+    assert causes_of(hull, black, unfit, epochs=(1, 1, 1)) == [NONE, broken, UNFIT]
+
+
+def causes_of(*pictures: U8, epochs: tuple[int, ...]) -> list[UnusableCause]:
+    perceiver = Perceiver(CONFIG, stopwatch_ms)
+    try:
+        return [
+            perceiver.perceive(picture, msgspec.structs.replace(header(seq), frame_epoch=epoch), 0.0)[0].cause
+            for seq, (picture, epoch) in enumerate(zip(pictures, epochs, strict=True))
+        ]
+    finally:
+        perceiver.close()
 
 
 @pytest.mark.parametrize("asks", [True, False])
