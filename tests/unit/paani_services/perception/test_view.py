@@ -8,7 +8,7 @@ import cv2
 import msgspec
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from paani.arrays import F32, U8
@@ -98,6 +98,7 @@ def test_doubt_stays_without_a_near_swimmer_in_water_that_is_sure(box: BoxXyxy, 
     assert view(below(row), UNFIT, box, sure) is UNFIT
 
 
+@example(COLUMNS // 2, 1, UNFIT, True)
 @given(st.integers(0, COLUMNS), st.integers(1, ROWS), st.sampled_from(UnusableCause), st.booleans())
 def test_an_unfit_picture_that_an_obstacle_fills_as_the_one_before_is_named_and_counts_for_nothing(
     columns: int, row: int, cause: UnusableCause, was_filled: bool
@@ -148,7 +149,7 @@ def test_a_picture_is_filled_only_where_the_one_before_was() -> None:
     assert causes_of(hull, unfit, unfit, hull, unfit, epochs=(1,) * 5) == [NONE, filled, filled, NONE, filled]
     assert causes_of(unfit, unfit, epochs=(1, 2)) == [UNFIT, UNFIT]
     assert causes_of(hull, unfit, epochs=(1, 2)) == [NONE, UNFIT]
-    assert causes_of(river_view, unfit, epochs=(1, 1)) == [NONE, UNFIT]
+    assert causes_of(hull, river_view, unfit, epochs=(1, 1, 1)) == [NONE, NONE, UNFIT]
     assert causes_of(hull, black, unfit, epochs=(1, 1, 1)) == [NONE, broken, UNFIT]
 
 
