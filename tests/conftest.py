@@ -45,7 +45,7 @@ BESIDE = {f"tests/{folder}/test_{name}.py" for folder, names in RESULTS_ALONE.it
 SOAK = "tests/bench/test_soak.py"  # first, as it sits out its minutes and hardly computes; it yields to nothing
 STOPS_THE_BOAT = {"fault", "link"}  # folders
 WORKER = "PYTEST_XDIST_WORKER" in os.environ  # other tests run at the same time
-NICENESS = 10  # two workers that compute leave most of two cores to the one that watches the clock
+NICENESS = 5  # two workers that compute leave more than half of two cores to the one that watches the clock
 MAX_REASON_CHARACTERS = 300
 
 settings.register_profile("quick", max_examples=15, deadline=None)  # for `make check`; everything else tries more

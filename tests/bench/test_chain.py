@@ -19,7 +19,7 @@ pytestmark = [pytest.mark.integration, pytest.mark.timeout(150)]
 def test_bench_chain(private_sets: tuple[str, ...]) -> None:
     words = [word for setting in private_sets for word in ("--set", setting)]
     result = subprocess.run(
-        [sys.executable, "-m", "paani", "bench", "chain", "--for", "4", "--json", *words],
+        [sys.executable, "-m", "paani", "bench", "chain", "--for", "8", "--json", *words],
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert result.returncode == 0, result.stderr
