@@ -22,6 +22,8 @@ from tests.integration.test_operator import Boat, station
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(90)]
 CELLS = "line => Object.fromEntries([...line.cells].map(cell => [cell.className, cell.textContent]))"
+MARKS_FROM_NORTH = """[...document.querySelectorAll("#map g")].sort((a, b) => a.getBBox().y - b.getBBox().y)
+  .map((mark) => mark.querySelector("text").textContent).join(", ")"""
 
 
 @contextlib.asynccontextmanager
@@ -50,10 +52,7 @@ async def test_two_vessels_on_the_page_and_a_stop_of_one(browser: Any, tmp_path:
                 await page.goto(f"http://127.0.0.1:{await port}/")
                 await page.wait_for_function("document.querySelectorAll('#map g.live').length === 2")
                 await page.get_by_text("2 of 2 vessels live").wait_for()
-                marks = await page.eval_on_selector_all(
-                    "#map g", "groups => groups.map(g => [g.querySelector('text').textContent, g.getBBox().y])"
-                )
-                assert [name for name, _ in sorted(marks, key=lambda mark: mark[1])] == ["beaver", "otter"]
+                await page.wait_for_function(f"{MARKS_FROM_NORTH} === 'beaver, otter'")
                 await page.get_by_role("button", name="STOP otter").click()
                 lines = page.locator("#vessels tr")
                 await lines.nth(0).get_by_text("STOPPED by shore").wait_for()
