@@ -130,7 +130,7 @@ def _process_frame(state: AdvisorState, evidence: Evidence, config: Config) -> A
 
 def _remembers_station(state: AdvisorState, evidence: Evidence, tracker: TrackerState, config: Config) -> bool:
     """Whether the station may be kept in an unusable picture that was looked at for people, by what was seen before."""
-    if evidence.usable or state.evidence is None or evidence.frame_epoch != state.evidence.frame_epoch:
+    if state.evidence is None or evidence.frame_epoch != state.evidence.frame_epoch:
         return False
     if evidence.candidates is msgspec.UNSET:
         return False

@@ -82,7 +82,7 @@ def may_keep_station_unseen(
 def nobody_near_s(obstacles: Iterable[Obstacle], config: Config) -> float:
     """For how long nobody can come within `stop_m` by swimming [s]; 0 where somebody may be there already.
 
-    Nobody: neither of these, nor whoever is farther off than `ahead_m`, where somebody may be out of sight.
+    Nobody: none of these, nor whoever is farther off than `ahead_m`, where somebody may be out of sight.
     """
     people = config.advisor.people
     if not people.use or not config.calibration.valid:

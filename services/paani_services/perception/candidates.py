@@ -35,7 +35,7 @@ def find_candidates(
     """
     known = [d.box_xyxy for d in detections if d.label is Label.PERSON]
     unsure = [
-        Candidate(kind=CandidateKind.UNSURE_BOX, confidence=d.confidence, box_xyxy=d.box_xyxy)
+        _unsure_box(d)
         for d in people
         if is_large_enough(d.box_xyxy)
         and not any(iou(d.box_xyxy, box) > SAME_IOU for box in known)
@@ -53,11 +53,11 @@ def find_candidates(
 
 def people_as_candidates(detections: tuple[Detection, ...]) -> tuple[Candidate, ...]:
     """The people among detections that count for nothing, as their picture is unusable: somebody may be there."""
-    return tuple(
-        Candidate(kind=CandidateKind.UNSURE_BOX, confidence=d.confidence, box_xyxy=d.box_xyxy)
-        for d in detections
-        if d.label is Label.PERSON
-    )
+    return tuple(_unsure_box(d) for d in detections if d.label is Label.PERSON)
+
+
+def _unsure_box(detection: Detection) -> Candidate:
+    return Candidate(kind=CandidateKind.UNSURE_BOX, confidence=detection.confidence, box_xyxy=detection.box_xyxy)
 
 
 def is_large_enough(box: BoxXyxy) -> bool:

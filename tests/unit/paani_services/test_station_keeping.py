@@ -24,10 +24,10 @@ from tests.unit.paani_services.navigator.test_interlocks import MISSION
 from tests.unit.paani_services.navigator.test_navigate import NOW_US, RUNNING, advice, inputs, pose
 
 CONTROLLER, NAVIGATOR = load_config().controller, load_config().navigator
-STOP_M = CALIBRATED.advisor.people.stop_m
+PEOPLE = CALIBRATED.advisor.people
+STOP_M = PEOPLE.stop_m
 LAND = m.LaneEvidence(non_water=1.0, uncertainty=0.8, clear_width=0.0)
 LAND_ALL_ROUND = msgspec.structs.replace(CLEAR, left=LAND, center=LAND, right=LAND)
-PEOPLE = CALIBRATED.advisor.people
 DOUBTED = (m.UnusableCause.FILLED, m.UnusableCause.NO_WATER, m.UnusableCause.NO_HORIZON)
 BROKEN = tuple(cause for cause in m.UnusableCause if cause not in (*DOUBTED, m.UnusableCause.NONE))
 AFTER_S = 1.0  # between two pictures

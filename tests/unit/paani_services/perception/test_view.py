@@ -22,6 +22,7 @@ from tests.pictures import river
 
 PICTURES = Path(__file__).parents[4] / "examples" / "pictures"
 CONFIG = load_config().perception
+DOUBTING = msgspec.structs.replace(CONFIG.image_quality, min_fitness=1.0, sure_fitness=1.0)  # every picture
 ROWS, COLUMNS = 64, 80
 VISIBLE = np.ones((ROWS, COLUMNS), np.float32)
 NONE, UNFIT = UnusableCause.NONE, UnusableCause.UNFIT
@@ -113,30 +114,35 @@ def test_an_unfit_picture_that_an_obstacle_fills_as_the_one_before_is_named_and_
     assert (judged is NONE) <= (cause is NONE)
 
 
-def header(seq: int) -> PictureHeader:
-    return PictureHeader(source_us=1 + seq, frame_seq=seq, frame_epoch=1, width_px=320, height_px=240)
+def perceive(
+    config: PerceptionConfig, *pictures: U8, epochs: tuple[int, ...] = (), age_s: float = 0.0
+) -> list[tuple[Evidence, U8 | None]]:
+    """What one pipeline makes of pictures that come one after the other, by default all of one epoch."""
+    perceiver, found = Perceiver(config, stopwatch_ms), []
+    try:
+        for seq, (picture, epoch) in enumerate(zip(pictures, epochs or (1,) * len(pictures), strict=True)):
+            header = PictureHeader(source_us=1 + seq, frame_seq=seq, frame_epoch=epoch, width_px=320, height_px=240)
+            found.append(perceiver.perceive(picture, header, age_s))
+    finally:
+        perceiver.close()
+    return found
+
+
+def causes_of(config: PerceptionConfig, *pictures: U8, epochs: tuple[int, ...] = ()) -> list[UnusableCause]:
+    return [evidence.cause for evidence, _ in perceive(config, *pictures, epochs=epochs)]
 
 
 def test_the_pipeline_names_the_view_and_gives_no_mask() -> None:
     """A limit that no picture meets makes any view one without water."""
     quality = msgspec.structs.replace(CONFIG.image_quality, min_water=1.0)
-    perceiver = Perceiver(msgspec.structs.replace(CONFIG, image_quality=quality), stopwatch_ms)
-    try:
-        evidence, mask = perceiver.perceive(river(), header(0), 0.0)
-    finally:
-        perceiver.close()
+    [(evidence, mask)] = perceive(msgspec.structs.replace(CONFIG, image_quality=quality), river())
     assert (evidence.usable, evidence.cause, mask) == (False, UnusableCause.NO_WATER, None)
     assert evidence.detections == ()
     assert evidence.center.non_water == 1.0
 
 
 def test_a_doubted_picture_without_a_swimmer_stays_refused_and_one_that_repeats_itself_is_frozen() -> None:
-    quality = msgspec.structs.replace(CONFIG.image_quality, min_fitness=1.0, sure_fitness=1.0)
-    perceiver = Perceiver(msgspec.structs.replace(CONFIG, image_quality=quality), stopwatch_ms)
-    try:
-        causes = [perceiver.perceive(river(), header(seq), 0.0)[0].cause for seq in range(4)]
-    finally:
-        perceiver.close()
+    causes = causes_of(msgspec.structs.replace(CONFIG, image_quality=DOUBTING), *[river()] * 4)
     assert causes == [UNFIT, UNFIT, UnusableCause.FROZEN, UnusableCause.FROZEN]
 
 
@@ -146,33 +152,20 @@ def test_a_picture_is_filled_only_where_the_one_before_was() -> None:
     unfit = apply_fault("blur", hull, np.zeros(hull.shape[:2], np.uint8), 3, np.random.default_rng(0))[0]
     black = np.zeros_like(hull)
     filled, broken = UnusableCause.FILLED, UnusableCause.BLACK
-    assert causes_of(hull, unfit, unfit, hull, unfit, epochs=(1,) * 5) == [NONE, filled, filled, NONE, filled]
-    assert causes_of(unfit, unfit, epochs=(1, 2)) == [UNFIT, UNFIT]
-    assert causes_of(hull, unfit, epochs=(1, 2)) == [NONE, UNFIT]
-    assert causes_of(hull, river_view, unfit, epochs=(1, 1, 1)) == [NONE, NONE, UNFIT]
-    assert causes_of(hull, black, unfit, epochs=(1, 1, 1)) == [NONE, broken, UNFIT]
-
-
-def causes_of(*pictures: U8, epochs: tuple[int, ...]) -> list[UnusableCause]:
-    perceiver = Perceiver(CONFIG, stopwatch_ms)
-    try:
-        return [
-            perceiver.perceive(picture, msgspec.structs.replace(header(seq), frame_epoch=epoch), 0.0)[0].cause
-            for seq, (picture, epoch) in enumerate(zip(pictures, epochs, strict=True))
-        ]
-    finally:
-        perceiver.close()
+    assert causes_of(CONFIG, hull, unfit, unfit, hull, unfit) == [NONE, filled, filled, NONE, filled]
+    assert causes_of(CONFIG, unfit, unfit, epochs=(1, 2)) == [UNFIT, UNFIT]
+    assert causes_of(CONFIG, hull, unfit, epochs=(1, 2)) == [NONE, UNFIT]
+    assert causes_of(CONFIG, hull, river_view, unfit) == [NONE, NONE, UNFIT]
+    assert causes_of(CONFIG, hull, black, unfit) == [NONE, broken, UNFIT]
 
 
 @pytest.mark.parametrize("asks", [True, False])
 def test_a_doubted_picture_is_looked_at_for_people_and_no_other_unusable_one_is(asks: bool) -> None:
     """A detector's person is a candidate of it, the vessel beside is none; whoever asks for none is told of none."""
     looks = msgspec.structs.replace(CONFIG, candidates=msgspec.structs.replace(CONFIG.candidates, use=asks))
-    quality = msgspec.structs.replace(CONFIG.image_quality, min_fitness=1.0, sure_fitness=1.0)
-    doubting, picture = msgspec.structs.replace(looks, image_quality=quality), read_picture("boat_ahead")
-    fit, doubted, stale = (
-        perceive(config, picture, age_s) for config, age_s in ((looks, 0.0), (doubting, 0.0), (doubting, 9.0))
-    )
+    doubting, picture = msgspec.structs.replace(looks, image_quality=DOUBTING), read_picture("boat_ahead")
+    [(fit, _)], [(doubted, _)] = perceive(looks, picture), perceive(doubting, picture)
+    [(stale, _)] = perceive(doubting, picture, age_s=9.0)
     people = [each for each in fit.detections if each.label is Label.PERSON]
     assert people
     assert len(people) < len(fit.detections)
@@ -190,11 +183,3 @@ def test_a_doubted_picture_is_looked_at_for_people_and_no_other_unusable_one_is(
 
 def read_picture(name: str) -> U8:
     return np.asarray(cv2.imread(str(PICTURES / f"{name}.jpg")), np.uint8)
-
-
-def perceive(config: PerceptionConfig, picture: U8, age_s: float) -> Evidence:
-    perceiver = Perceiver(config, stopwatch_ms)
-    try:
-        return perceiver.perceive(picture, header(0), age_s)[0]
-    finally:
-        perceiver.close()
