@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from pathlib import Path
 from typing import Any
 
@@ -49,6 +50,12 @@ PIXEL = """([x, y]) => {
   const c = document.querySelector("#camera");
   return [...c.getContext("2d").getImageData(Math.round(x * c.width), Math.round(y * c.height), 1, 1).data].slice(0, 3);
 }"""
+
+# Whether an expression is true, and what is wrong with it; both are asked at one instant, as the page may be loading.
+TRY = """(async () => {
+  try { return [!!(await (%s)), null]; }
+  catch (fault) { return [false, typeof paani === "undefined" ? null : `${fault}`]; }
+})()"""
 
 LIMITS = "[...document.querySelectorAll('.lane u')].map((mark) => (parseFloat(mark.style.left) / 100).toFixed(2))"
 
@@ -310,28 +317,22 @@ async def wait_for_arming(boat: Boat, *, armed: bool, stopped: bool) -> None:
 
 
 async def until(page: Any, expression: str) -> None:
-    """Wait until an expression is true; the page's policy forbids Playwright's own waiting, which evaluates text."""
+    """Wait until an expression is true; the page's policy forbids Playwright's own waiting, which evaluates text.
+
+    Raises AssertionError where the expression fails on the dashboard's page once all of its scripts have run; before
+    that, and on any other page, it is taken for false.
+    """
     from playwright.async_api import Error  # noqa: PLC0415  without a browser these tests skip
 
     async with asyncio.timeout(WAIT_S):
         while True:
-            try:
-                if await page.evaluate(expression):
+            # Playwright itself fails where the page is loaded anew meanwhile.
+            with contextlib.suppress(Error):
+                is_true, fault = await page.evaluate(TRY % expression)
+                assert not fault, f"{expression}: {fault}"
+                if is_true:
                     return
-            except Error:
-                if await is_loaded(page):
-                    raise
             await asyncio.sleep(0.05)
-
-
-async def is_loaded(page: Any) -> bool:
-    """Whether all scripts of the dashboard's page have run, and it is not loaded again at this moment."""
-    from playwright.async_api import Error  # noqa: PLC0415  without a browser these tests skip
-
-    try:
-        return bool(await page.evaluate("typeof paani !== 'undefined'"))
-    except Error:
-        return False
 
 
 async def has_colour_on_map(page: Any, rgb: tuple[int, int, int], east_m: float, north_m: float) -> bool:
