@@ -64,29 +64,29 @@ def test_the_integral_holds_the_line_against_wind_and_current(windy_lake: World)
     assert worst_m[0.0] > 1.0
 
 
-def way_while_stopped_m(world: World, *sets: str) -> float:
-    """How far the boat comes [m] in 40 s of a STOP for what lies on the water."""
+def farthest_while_stopped_m(world: World, *sets: str) -> float:
+    """How far the boat ever is from where it was [m] in 90 s of a STOP for what lies on the water."""
     boat = Lockstep(world, load_config(sets=(*PERFECT, *sets)))
     boat.camera = CAMERA
-    from_m = boat.plant.position_m
+    from_m, farthest_m = boat.plant.position_m, 0.0
     boat.advisory = Advisory(
         source_us=boat.now_us, direction=Direction.STOP, reason=Reason.NO_SAFE_SIDE, may_keep_station=True
     )
-    for _ in boat.run(40.0):
+    for _ in boat.run(90.0):
         boat.advisory = msgspec.structs.replace(boat.advisory, source_us=boat.now_us)
-    to_m = boat.plant.position_m
+        farthest_m = max(farthest_m, math.dist(from_m, boat.plant.position_m))
     boat.plant.close()
-    return math.dist(from_m, to_m)
+    return farthest_m
 
 
 @pytest.mark.parametrize("to_the_bow_rad", [0.0, math.pi, 0.5 * math.pi], ids=["bow first", "stern first", "abeam"])
 def test_a_boat_that_the_advice_stops_does_not_drift_on_to_what_it_stopped_for(to_the_bow_rad: float) -> None:
-    """0.2 m/s of current from any side: kept on station it makes less than half of the way that it makes adrift."""
+    """0.2 m/s of current from any side: in 90 s it is never as far away as one that drifts is in 10 s."""
     lake = open_water("lake")
     current = Current(speed_mps=0.2, toward_rad=lake.start.yaw_rad + to_the_bow_rad)
     streaming = dataclasses.replace(lake, current=current)
     adrift_m, kept_m = (
-        way_while_stopped_m(streaming, f"navigator.keep_station={keeps}") for keeps in ("false", "true")
+        farthest_while_stopped_m(streaming, f"navigator.keep_station={keeps}") for keeps in ("false", "true")
     )
-    assert adrift_m > 4.0
-    assert kept_m < 0.5 * adrift_m
+    assert adrift_m > 10.0
+    assert kept_m < 10.0 / 90.0 * adrift_m

@@ -31,8 +31,9 @@ from paani.missions import mission_of_route
 from paani.thrust_adapter import AppliedThrust, ThrustAdapter
 from paani_services.controller.control import ControllerInputs, ControllerState, compute_thrust
 from paani_services.localization.choice import create_estimator
+from paani_services.navigator.interlocks import NavigatorInputs
 from paani_services.navigator.mapping.occupancy_grid import UNCALIBRATED_CAMERA
-from paani_services.navigator.navigate import NavigatorInputs, NavigatorState, navigate
+from paani_services.navigator.navigate import NavigatorState, navigate
 from paani_sim.plant.plant import Plant
 from paani_sim.plant.telemetry import gps_message, imu_message
 from paani_sim.worlds import World, load_world

@@ -30,9 +30,10 @@ from paani.messages import (
 from paani.missions import mission_of_route
 from paani_services.navigator.avoidance.rollout import PIVOT_SPEED_FRACTION
 from paani_services.navigator.decide import DECIDER
+from paani_services.navigator.interlocks import NavigatorInputs
 from paani_services.navigator.mapping.observed_cells import Camera
 from paani_services.navigator.mapping.occupancy_grid import UNCALIBRATED_CAMERA
-from paani_services.navigator.navigate import NavigatorInputs, NavigatorState, navigate
+from paani_services.navigator.navigate import NavigatorState, navigate
 from paani_sim.eye.camera import BoatPose
 from tests.synthetic_water import AT_REST, CAMERA, START_US, Bar, evidence, odometry, water_edge_of
 

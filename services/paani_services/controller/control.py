@@ -13,7 +13,7 @@ import msgspec
 
 from paani.config import ControllerConfig
 from paani.geometry import clip, wrap_rad
-from paani.messages import Inhibit, NavCommand, Odometry, Thrust
+from paani.messages import STATION_ASTERN_MPS, Inhibit, NavCommand, Odometry, Thrust
 
 MAP_FRAME = "map"
 STANDSTILL_ORDER_MPS = 0.01  # a slower order asks the boat to stand still
@@ -64,7 +64,7 @@ def compute_thrust(
         step_s = clip((now_us - state.last_us) * 1e-6, 0.0, MAX_STEP_S)
 
     if command.keeps_station:
-        state = _without_way(state, odometry)
+        state = _without_way(state, odometry.surge_mps + command.astern_mps)
     speed_error_mps, forward, integral = _forward_thrust(state.integral, command, odometry, step_s, config)
     max_steer = config.max_steer
     if command.keeps_station:
@@ -91,12 +91,11 @@ def compute_thrust(
     )
 
 
-def _without_way(state: ControllerState, odometry: Odometry) -> ControllerState:
-    """The state without the thrust and the integral that push the way the boat goes already."""
-    surge_mps = odometry.surge_mps
-    if (state.left + state.right) * surge_mps > 0.0:
+def _without_way(state: ControllerState, beyond_mps: float) -> ControllerState:
+    """The state without the thrust and the integral that push the boat farther beyond the speed that is ordered."""
+    if (state.left + state.right) * beyond_mps > 0.0:
         state = msgspec.structs.replace(state, left=0.0, right=0.0)
-    return msgspec.structs.replace(state, integral=0.0) if state.integral * surge_mps > 0.0 else state
+    return msgspec.structs.replace(state, integral=0.0) if state.integral * beyond_mps > 0.0 else state
 
 
 def find_inhibits(inputs: ControllerInputs, now_us: int, domain: int, config: ControllerConfig) -> tuple[Inhibit, ...]:
@@ -164,8 +163,12 @@ def _is_valid(command: NavCommand) -> bool:
         and not (command.speed_mps > 0.0 and command.astern_mps > 0.0)
         and command.frame == MAP_FRAME
         and not (command.enable and command.inhibits)
-        and not (command.keeps_station and (command.speed_mps or command.astern_mps or not command.vetoes))
+        and not (command.keeps_station and not _is_of_a_station(command))
     )
+
+
+def _is_of_a_station(command: NavCommand) -> bool:
+    return command.speed_mps == 0.0 and command.astern_mps <= STATION_ASTERN_MPS and bool(command.vetoes)
 
 
 def _is_finite(odometry: Odometry) -> bool:

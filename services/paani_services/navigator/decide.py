@@ -10,9 +10,10 @@ from paani.decider import Decider, Inputs, Outputs
 from paani.messages import Mission, Route
 from paani.missions import mission_of_route
 from paani.motion_planning import MotionPlanner
+from paani_services.navigator.interlocks import NavigatorInputs
 from paani_services.navigator.mapping.observed_cells import Camera
 from paani_services.navigator.modes import follow_order
-from paani_services.navigator.navigate import NavigatorInputs, NavigatorState
+from paani_services.navigator.navigate import NavigatorState
 
 
 def decide(

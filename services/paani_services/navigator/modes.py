@@ -28,15 +28,14 @@ from paani.motion_planning import MotionPlanner
 from paani_services.navigator.avoidance.fence import limit_speed
 from paani_services.navigator.guidance.ilos import IlosState
 from paani_services.navigator.guidance.mission_progress import MissionProgress
+from paani_services.navigator.interlocks import NavigatorInputs, is_out_of_date
 from paani_services.navigator.mapping.observed_cells import Camera
 from paani_services.navigator.mapping.occupancy_grid import UNCALIBRATED_CAMERA
 from paani_services.navigator.navigate import (
-    NavigatorInputs,
     NavigatorState,
     begin_step,
     build_command,
     hold_cross_track,
-    is_out_of_date,
     navigate,
     note_clock_advance,
     speed_limit_mps,

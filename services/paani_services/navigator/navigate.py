@@ -13,16 +13,11 @@ from paani.fence_geometry import Fence, is_allowed
 from paani.geometry import wrap_rad
 from paani.messages import (
     Advisory,
-    Arming,
     Direction,
-    Evidence,
     Inhibit,
     Mission,
     NavCommand,
     Odometry,
-    OperatorOrder,
-    SimTime,
-    Tracks,
 )
 from paani.motion_planning import MotionPlanner
 from paani_services.navigator.avoidance.fence import limit_speed
@@ -44,7 +39,13 @@ from paani_services.navigator.guidance.mission_progress import (
     describe_leg,
 )
 from paani_services.navigator.guidance.passed_obstacles import PassedObstacles, limit_course_rad, remember_obstacles
-from paani_services.navigator.guidance.station_keeping import drift_heading_rad, may_keep_station
+from paani_services.navigator.guidance.station_keeping import (
+    Station,
+    StationSetpoint,
+    hold_station,
+    may_keep_station,
+    take_station,
+)
 from paani_services.navigator.guidance.visual_turns import (
     TURN_DIRECTIONS,
     TURN_SIDE,
@@ -53,6 +54,7 @@ from paani_services.navigator.guidance.visual_turns import (
     is_turn_to_look,
     latch_heading,
 )
+from paani_services.navigator.interlocks import NavigatorInputs, find_inhibits
 from paani_services.navigator.mapping.observed_cells import Camera
 from paani_services.navigator.mapping.occupancy_grid import UNCALIBRATED_CAMERA
 
@@ -72,7 +74,7 @@ class NavigatorState(
     `sim_us` is the newest simulated time, -1 before the first; `clock_advanced_us` is when it last moved forward.
     `is_ordered`: an order of a mode was heard. Of HOLD or RETURN: `errand` is how far that has come, `errand_ilos` its
     integral, `errand_since_us` when it was ordered. `progress` and `ilos` are those of the mission throughout.
-    `legs_us`: stamp of the legs that they count for.
+    `legs_us`: stamp of the legs that they count for. `station`: where the boat is kept while it stops.
     """
 
     progress: MissionProgress = MissionProgress()
@@ -87,23 +89,7 @@ class NavigatorState(
     errand_ilos: IlosState = IlosState()
     errand_since_us: int = 0
     legs_us: int = 0
-
-
-class NavigatorInputs(msgspec.Struct, frozen=True):
-    """The newest message of each kind, and when it was received [us]."""
-
-    advisory: Advisory | None = None
-    advisory_us: int = 0
-    odometry: Odometry | None = None
-    odometry_us: int = 0
-    clock: SimTime | None = None
-    clock_us: int = 0
-    arming: Arming | None = None
-    arming_us: int = 0
-    evidence: Evidence | None = None
-    tracks: Tracks | None = None
-    order: OperatorOrder | None = None
-    order_us: int = 0
+    station: Station | None = None
 
 
 def navigate(
@@ -143,21 +129,11 @@ def navigate(
         inhibits.append(setpoint.inhibit)
     if not is_allowed(mission.bounds, position_m) and not config.fence_return:
         inhibits.append(Inhibit.OUTSIDE_FENCE)
-    leg = describe_leg(state.progress, mission)
-    cross_m = setpoint.cross_track_m
+    leg, cross_m = describe_leg(state.progress, mission), setpoint.cross_track_m
     if inhibits:
         state = hold_cross_track(state, now_us)
-        keeps_station = is_planned and config.keep_station and may_keep_station(inhibits, advisory)
-        return state, build_command(
-            state,
-            inputs,
-            now_us,
-            inhibits,
-            drift_heading_rad(odometry),
-            keeps_station=keeps_station,
-            cross_m=cross_m,
-            leg=leg,
-        )
+        state, at_station = _keep_station(state, inputs, inhibits, now_us, config, camera)
+        return state, build_command(state, inputs, now_us, inhibits, at_station=at_station, cross_m=cross_m, leg=leg)
     heading_rad, limit_mps = setpoint.course_rad, speed_limit_mps(advisory)
     speed_mps = min(setpoint.speed_mps, limit_mps)
     if direction in TURN_DIRECTIONS:
@@ -204,12 +180,32 @@ def begin_step(
 ) -> tuple[NavigatorState, list[Inhibit]]:
     """What every mode begins with: the state with what this step shows, and what about the inputs forbids motion."""
     state = note_clock_advance(state, inputs, now_us)
-    inhibits = _find_inhibits(state, inputs, now_us, domain, config)
+    inhibits = find_inhibits(inputs, state.clock_advanced_us, now_us, domain, config)
+    if inhibits and inhibits != [Inhibit.ADVISED_STOP]:
+        state = msgspec.structs.replace(state, station=None)  # it lies by dead reckoning, which may have begun anew
     state = _end_visual_turn(state, inputs)
     if config.planner.acts_on(camera.calibration):
         planner_state = observe(state.planner_state, inputs.odometry, inputs.evidence, config.planner, inputs.tracks)
         state = msgspec.structs.replace(state, planner_state=planner_state)
     return state, inhibits
+
+
+def _keep_station(
+    state: NavigatorState,
+    inputs: NavigatorInputs,
+    inhibits: list[Inhibit],
+    now_us: int,
+    config: NavigatorConfig,
+    camera: Camera,
+) -> tuple[NavigatorState, StationSetpoint | None]:
+    """The state with the station that is kept, and what holds the boat there; None: no thrust."""
+    here, odometry = state.planner_state.memory.odom_pose, inputs.odometry
+    is_kept = config.keep_station and config.planner.acts_on(camera.calibration)
+    if not is_kept or not may_keep_station(inhibits, inputs.advisory) or here is None or odometry is None:
+        return state, None
+    here_m = (here.x_m, here.y_m)
+    station = take_station(state.station, here_m, now_us, config)
+    return msgspec.structs.replace(state, station=station), hold_station(station, here_m, odometry)
 
 
 def _advance_mission(
@@ -295,56 +291,6 @@ def note_clock_advance(state: NavigatorState, inputs: NavigatorInputs, now_us: i
     return msgspec.structs.replace(state, sim_us=sim_us, clock_advanced_us=now_us)
 
 
-def is_out_of_date(stamp_us: int, limit_s: float, now_us: int, config: NavigatorConfig) -> bool:
-    """Whether a stamp is older than the limit, or of the future."""
-    return not -config.max_future_s <= (now_us - stamp_us) * 1e-6 <= limit_s
-
-
-def _find_inhibits(
-    state: NavigatorState, inputs: NavigatorInputs, now_us: int, domain: int, config: NavigatorConfig
-) -> list[Inhibit]:
-    """Everything about the inputs that forbids motion (M8-M11)."""
-
-    def is_old(stamp_us: int, limit_s: float) -> bool:
-        return is_out_of_date(stamp_us, limit_s, now_us, config)
-
-    found: list[Inhibit] = []
-    advisory, odometry, clock, arming = inputs.advisory, inputs.odometry, inputs.clock, inputs.arming
-    messages = (advisory, odometry, clock, arming, inputs.evidence)
-    if any(message is not None and message.domain != domain for message in messages):
-        found.append(Inhibit.WRONG_DOMAIN)
-    if arming is None or not arming.armed or arming.stopped or is_old(inputs.arming_us, config.arming_max_age_s):
-        found.append(Inhibit.NOT_ARMED)
-    if clock is None or is_old(inputs.clock_us, config.clock_max_age_s):
-        found.append(Inhibit.NO_CLOCK)
-    elif (
-        not clock.running or state.clock_advanced_us is None or is_old(state.clock_advanced_us, config.clock_max_age_s)
-    ):
-        found.append(Inhibit.CLOCK_STOPPED)
-    if odometry is None:
-        found.append(Inhibit.NO_ODOMETRY)
-    else:
-        if is_old(inputs.odometry_us, config.odometry_max_age_s) or is_old(
-            odometry.source_us, config.odometry_max_age_s
-        ):
-            found.append(Inhibit.STALE_ODOMETRY)
-        numbers = (odometry.x_m, odometry.y_m, odometry.yaw_rad)
-        if not odometry.healthy or not all(map(math.isfinite, numbers)):
-            found.append(Inhibit.UNHEALTHY_ODOMETRY)
-    if advisory is None:
-        found.append(Inhibit.NO_ADVISORY)
-    else:
-        if is_old(inputs.advisory_us, config.advisory_max_receipt_s) or is_old(
-            advisory.source_us, config.advisory_max_age_s
-        ):
-            found.append(Inhibit.STALE_ADVISORY)
-        if advisory.direction is Direction.STOP:
-            found.append(Inhibit.ADVISED_STOP)
-        elif advisory.direction is Direction.NO_DATA:
-            found.append(Inhibit.ADVISED_NO_DATA)
-    return found
-
-
 def _end_visual_turn(state: NavigatorState, inputs: NavigatorInputs) -> NavigatorState:
     """End the visual turn on STRAIGHT advice or when the boat is disarmed; a STOP between two turns does not end it."""
     is_straight = inputs.advisory is not None and inputs.advisory.direction is Direction.STRAIGHT
@@ -364,14 +310,15 @@ def build_command(
     *,
     astern_mps: float = 0.0,
     vetoes: tuple[Inhibit, ...] = (),
-    keeps_station: bool = False,
+    at_station: StationSetpoint | None = None,
     cross_m: float = 0.0,
     leg: str = "",
     obstacle_track_ids: tuple[int, ...] = (),
 ) -> NavCommand:
     """The order; one with an inhibit is disabled, whatever else is asked for, but for one that keeps the station."""
     advisory = inputs.advisory
-    if keeps_station:
+    if at_station is not None:
+        heading_rad, astern_mps = at_station
         vetoes, inhibits = tuple(inhibits), []
     enable = not inhibits
     return NavCommand(
@@ -381,7 +328,7 @@ def build_command(
         speed_mps=speed_mps if enable else 0.0,
         astern_mps=astern_mps if enable else 0.0,
         vetoes=vetoes,
-        keeps_station=keeps_station,
+        keeps_station=at_station is not None,
         echo_us=inputs.clock.stamp_us if inputs.clock is not None else 0,
         inhibits=tuple(inhibits),
         direction=advisory.direction if advisory is not None else Direction.NO_DATA,

@@ -27,7 +27,7 @@ from paani.messages.advisor import (
 )
 from paani.messages.camera import PictureHeader, TimeBase
 from paani.messages.decision import InputMessage, OutputMessage, Step
-from paani.messages.guidance import Arming, Inhibit, NavCommand, Odometry, Route, Thrust, Waypoint
+from paani.messages.guidance import STATION_ASTERN_MPS, Arming, Inhibit, NavCommand, Odometry, Route, Thrust, Waypoint
 from paani.messages.header import BoxXyxy, Count, Finite, Message, NonNegative, Signed, Stamp, Text, Unit
 from paani.messages.health import DropCount, Health, InputHealth, Pulse
 from paani.messages.microcontroller import BridgeState, McuState, McuVerdict, ResetCause
@@ -72,6 +72,7 @@ from paani.messages.tuning import Change, Disagreement, Shadow, Tuning, TuningAc
 __all__ = [
     "INPUT_FAULTS",
     "SIDE_OF",
+    "STATION_ASTERN_MPS",
     "Advisory",
     "ArmRefusal",
     "Arming",

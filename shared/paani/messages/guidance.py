@@ -41,6 +41,9 @@ class Inhibit(StrEnum):
     BLOCKED_AHEAD = "BLOCKED_AHEAD"
 
 
+STATION_ASTERN_MPS = 0.2  # most of a boat that goes back to its station: two thirds of an advised turn's speed
+
+
 class NavCommand(Message, frozen=True, kw_only=True):
     """Atomic order to the controller: heading, speed, enable, frame and the reasons not to move, together (B11).
 
@@ -52,8 +55,9 @@ class NavCommand(Message, frozen=True, kw_only=True):
     the same in words.
     `obstacle_track_ids`: the advisor's tracks of the dynamic obstacles that the plan in force was made for.
     `astern_mps`: the speed astern that a hand asks for, only where `speed_mps` is 0. `vetoes`: why a hand gets no
-    thrust ahead, while it may turn and go astern. `keeps_station`: the advice stops the boat, which `vetoes` names, and
-    thrust may only work against the way that it makes; both speeds are 0, the heading is that of the drift.
+    thrust ahead, while it may turn and go astern. `keeps_station`: the advice stops the boat, which `vetoes`
+    names, and it is held where it stopped: `speed_mps` is 0, `astern_mps` at most `STATION_ASTERN_MPS`, back to
+    the place from which it was carried, and the heading is where it is carried to.
     """
 
     enable: bool

@@ -1,4 +1,4 @@
-"""A boat that the advice stops is held where it is: when thrust may do so, and that it only works against its way."""
+"""A boat that the advice stops is held where it stopped: when thrust may do so, and what it may do."""
 
 from __future__ import annotations
 
@@ -6,16 +6,27 @@ import math
 
 import msgspec
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from paani import messages as m
 from paani.config import Config, ControllerConfig, load_config
+from paani.geometry import wrap_rad
 from paani.messages import Direction, Inhibit
 from paani_services.advisor.advise import advise
 from paani_services.advisor.people import may_keep_station, nobody_near_s
 from paani_services.advisor.risk import Obstacle
 from paani_services.controller.control import ControllerInputs, ControllerState, compute_thrust
+from paani_services.navigator.guidance.station_keeping import (
+    AT_STATION_M,
+    LEAD_S,
+    LOST_M,
+    RESUME_S,
+    RETURN_PER_S,
+    Station,
+    hold_station,
+    take_station,
+)
 from paani_services.navigator.navigate import navigate
 from tests.synthetic_water import CAMERA
 from tests.unit.paani_services.advisor.advisor_evidence import CALIBRATED, CLEAR, PAPER, play
@@ -151,20 +162,99 @@ def test_an_order_that_keeps_the_station_asks_for_no_speed_and_names_its_veto(re
     assert (order.vetoes, order.direction) == ((Inhibit.ADVISED_STOP,), Direction.STOP)
 
 
-@given(st.floats(-math.pi, math.pi), st.floats(-0.6, 0.6), st.floats(-0.6, 0.6))
-def test_the_bow_is_turned_to_where_the_boat_drifts_and_a_boat_at_rest_is_not_turned(
-    yaw_rad: float, surge_mps: float, sway_mps: float
+METRES, SPEED, ANGLE = st.floats(-LOST_M, LOST_M), st.floats(-0.6, 0.6), st.floats(-math.pi, math.pi)
+
+
+@given(METRES, METRES, ANGLE, SPEED, SPEED)
+def test_a_boat_goes_back_astern_alone_and_only_nearer_to_its_station(
+    x_m: float, y_m: float, yaw_rad: float, surge_mps: float, sway_mps: float
 ) -> None:
-    adrift = msgspec.structs.replace(pose(3.0, 0.0, yaw_rad), surge_mps=surge_mps, sway_mps=sway_mps)
-    resting = msgspec.structs.replace(adrift, stopped=True)
-    along, rests = (
-        navigate(RUNNING, inputs(advisory=STOPPED, odometry=each), MISSION, NOW_US, 43, NAVIGATOR, CAMERA)[1]
-        for each in (adrift, resting)
+    """Wherever it was carried: what it makes in a tenth of a second brings it nearer, or is nothing."""
+    at = msgspec.structs.replace(pose(0.0, 0.0, yaw_rad), surge_mps=surge_mps, sway_mps=sway_mps)
+    order = hold_station(Station(0, 0, 0.0, 0.0), (x_m, y_m), at)
+    assert 0.0 <= order.astern_mps <= m.STATION_ASTERN_MPS
+    way_m = 0.1 * order.astern_mps
+    after_m = math.hypot(x_m - way_m * math.cos(yaw_rad), y_m - way_m * math.sin(yaw_rad))
+    assert after_m <= math.hypot(x_m, y_m) + 1e-9
+    off_the_stern_rad = wrap_rad(math.atan2(-y_m, -x_m) - yaw_rad - math.pi)
+    assert order.astern_mps == 0.0 or abs(off_the_stern_rad) < math.radians(45.001), "over water that it has not come"
+
+
+@given(METRES, METRES, ANGLE, SPEED, SPEED)
+def test_the_bow_is_turned_to_where_the_boat_is_carried_and_a_boat_at_rest_is_not_turned(
+    x_m: float, y_m: float, yaw_rad: float, surge_mps: float, sway_mps: float
+) -> None:
+    adrift = msgspec.structs.replace(pose(0.0, 0.0, yaw_rad), surge_mps=surge_mps, sway_mps=sway_mps)
+    there = Station(0, 0, 0.0, 0.0)
+    turned, resting = (hold_station(there, (x_m, y_m), each).heading_rad
+                       for each in (adrift, msgspec.structs.replace(adrift, stopped=True)))  # fmt: skip
+    assert resting == yaw_rad
+    cos, sin = math.cos(yaw_rad), math.sin(yaw_rad)
+    soon_m = (x_m + LEAD_S * (surge_mps * cos - sway_mps * sin), y_m + LEAD_S * (surge_mps * sin + sway_mps * cos))
+    off_m = math.hypot(*soon_m)
+    wanted_rad = math.atan2(soon_m[1], soon_m[0]) if off_m > AT_STATION_M + 1e-9 else yaw_rad
+    assume(abs(off_m - AT_STATION_M) > 1e-6)
+    assert math.cos(turned - wanted_rad) == pytest.approx(1.0)
+
+
+BRAKE_US = round(NAVIGATOR.planner.brake_s * 1e6)
+
+
+def test_the_station_is_where_the_boat_has_braked_until_it_is_lost() -> None:
+    station = take_station(None, (0.0, 0.0), NOW_US, NAVIGATOR)
+    braking = take_station(station, (0.5, 0.0), NOW_US + BRAKE_US - 1, NAVIGATOR)
+    assert braking == Station(NOW_US, NOW_US + BRAKE_US - 1, 0.5, 0.0)
+    kept = take_station(braking, (0.5, LOST_M), NOW_US + BRAKE_US, NAVIGATOR)
+    assert kept == Station(NOW_US, NOW_US + BRAKE_US, 0.5, 0.0)
+    after_us = NOW_US + BRAKE_US + 1
+    assert take_station(kept, (0.5, LOST_M + 0.01), after_us, NAVIGATOR) == Station(
+        after_us, after_us, 0.5, LOST_M + 0.01
     )
-    off_rad = along.heading_rad - yaw_rad
-    assert math.sin(off_rad) * surge_mps == pytest.approx(math.cos(off_rad) * sway_mps, abs=1e-9)
-    assert math.cos(off_rad) * surge_mps + math.sin(off_rad) * sway_mps >= 0.0
-    assert rests.heading_rad == pytest.approx(yaw_rad)
+
+
+def test_a_boat_that_stops_again_soon_goes_back_and_later_has_another_place() -> None:
+    station, resume_us = Station(NOW_US - 9_000_000, NOW_US, 0.5, 0.0), round(RESUME_S * 1e6)
+    again = take_station(station, (0.9, 0.0), NOW_US + resume_us - 1, NAVIGATOR)
+    assert again == msgspec.structs.replace(station, stopped_us=NOW_US + resume_us - 1)
+    for other_us in (NOW_US + resume_us, NOW_US - 1):  # later, and before by a clock that was set back
+        assert take_station(station, (0.9, 0.0), other_us, NAVIGATOR) == Station(other_us, other_us, 0.9, 0.0)
+
+
+def test_a_boat_that_is_carried_on_is_ordered_back() -> None:
+    """At 0.2 m/s ahead for 4 s: 0.5 m beyond where it should have braked."""
+    state, order = RUNNING, KEEPING
+    for now_us in range(NOW_US, NOW_US + 4_000_001, 100_000):
+        carried = msgspec.structs.replace(pose(3.0, 0.0, source_us=now_us), surge_mps=0.2)
+        advisory = msgspec.structs.replace(STOPPED, source_us=now_us)
+        given_inputs = inputs(now_us, advisory=advisory, odometry=carried)
+        state, order = navigate(state, given_inputs, MISSION, now_us, 43, NAVIGATOR, CAMERA)
+    way_m = 0.2 * (4.0 - NAVIGATOR.planner.brake_s)
+    assert order.astern_mps == pytest.approx(RETURN_PER_S * way_m, abs=0.2 * RETURN_PER_S * 0.1 + 1e-9)
+    assert order.heading_rad == pytest.approx(0.0)
+
+
+LATER_US = NOW_US + 100_000
+
+
+@pytest.mark.parametrize(
+    ("changes", "stopped_us"),
+    [
+        ({}, LATER_US),
+        ({"advisory": advice(Direction.STRAIGHT, LATER_US)}, NOW_US),
+        ({"arming": m.Arming(source_us=LATER_US, armed=False)}, None),
+        ({"odometry": pose(3.0, 0.0, source_us=LATER_US - 60_000_000)}, None),
+        ({"odometry": msgspec.structs.replace(pose(3.0, 0.0, source_us=LATER_US), healthy=False)}, None),
+        ({"odometry": None}, None),
+    ],
+)
+def test_a_boat_goes_back_to_no_place_of_before_anything_else_stopped_it(
+    changes: dict[str, object], stopped_us: int | None
+) -> None:
+    """A place lies by dead reckoning, which has begun anew where the odometry was missing."""
+    state, _ = navigate(RUNNING, inputs(advisory=STOPPED), MISSION, NOW_US, 43, NAVIGATOR, CAMERA)
+    given_inputs = inputs(LATER_US, **({"advisory": msgspec.structs.replace(STOPPED, source_us=LATER_US)} | changes))
+    after, _ = navigate(state, given_inputs, MISSION, LATER_US, 43, NAVIGATOR, CAMERA)
+    assert (after.station.stopped_us if after.station is not None else None) == stopped_us
 
 
 @pytest.mark.parametrize(
@@ -215,8 +305,11 @@ FAN, PART = st.floats(-CONTROLLER.astern, 1.0), st.floats(-CONTROLLER.max_integr
 
 
 @pytest.mark.parametrize("config", [CONTROLLER, ONLY_PUSHING])
-@given(FAN, FAN, PART, st.floats(-1.5, 1.5), st.floats(-math.pi, math.pi), st.floats(-2.0, 2.0))
-def test_both_fans_together_never_push_the_way_the_boat_goes(
+@given(
+    FAN, FAN, PART, st.floats(-1.5, 1.5), st.floats(-math.pi, math.pi), st.floats(-2.0, 2.0),
+    st.just(0.0) | st.floats(0.0, m.STATION_ASTERN_MPS),
+)  # fmt: skip
+def test_both_fans_together_never_push_the_boat_ahead_nor_beyond_the_speed_back_to_its_station(
     config: ControllerConfig,
     left: float,
     right: float,
@@ -224,13 +317,14 @@ def test_both_fans_together_never_push_the_way_the_boat_goes(
     surge_mps: float,
     heading_rad: float,
     rate_radps: float,
+    astern_mps: float,
 ) -> None:
     """Whatever the fans did before, whatever turn is damped: at once, without waiting for the slew limit."""
     start = ControllerState(integral, max(left, -config.astern), max(right, -config.astern), NOW_US - 100_000)
-    order = msgspec.structs.replace(KEEPING, heading_rad=heading_rad)
+    order = msgspec.structs.replace(KEEPING, heading_rad=heading_rad, astern_mps=astern_mps)
     thrust = thrust_for(order, start, config, surge_mps=surge_mps, yaw_rate_radps=rate_radps)
     assert thrust.enabled
-    assert (thrust.left + thrust.right) * surge_mps <= 1e-9
+    assert (thrust.left + thrust.right) * (surge_mps + astern_mps) <= 1e-9
     assert all(-config.astern <= fan <= 1.0 for fan in (thrust.left, thrust.right))
 
 
@@ -241,7 +335,7 @@ def test_a_boat_that_drifts_is_pushed_back(surge_mps: float) -> None:
     assert thrust.left * surge_mps < -1e-3
 
 
-@pytest.mark.parametrize("changes", [{"speed_mps": 0.1}, {"astern_mps": 0.1}, {"vetoes": ()}])
+@pytest.mark.parametrize("changes", [{"speed_mps": 0.01}, {"astern_mps": 0.201}, {"vetoes": ()}])
 def test_an_order_that_keeps_the_station_and_asks_for_more_is_invalid(changes: dict[str, object]) -> None:
     thrust = thrust_for(msgspec.structs.replace(KEEPING, **changes), ControllerState())
     assert (thrust.enabled, thrust.inhibits) == (False, (Inhibit.COMMAND_INVALID,))

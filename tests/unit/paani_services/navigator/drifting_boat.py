@@ -17,7 +17,8 @@ from paani.messages import (
     Reason,
     SimTime,
 )
-from paani_services.navigator.navigate import NavigatorInputs, NavigatorState, navigate
+from paani_services.navigator.interlocks import NavigatorInputs
+from paani_services.navigator.navigate import NavigatorState, navigate
 
 STEP_S = 0.1
 TURN_RADPS, TURN_LAG_S, SPEED_LAG_S = 0.35, 1.5, 2.0

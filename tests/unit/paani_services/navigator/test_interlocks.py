@@ -17,13 +17,12 @@ from paani_services.navigator.avoidance.rollout import PIVOT_SPEED_FRACTION, RES
 from paani_services.navigator.guidance.ilos import IlosState
 from paani_services.navigator.guidance.mission_progress import MissionProgress
 from paani_services.navigator.guidance.visual_turns import VisualTurn
+from paani_services.navigator.interlocks import NavigatorInputs, is_out_of_date
 from paani_services.navigator.modes import follow_order
 from paani_services.navigator.navigate import (
-    NavigatorInputs,
     NavigatorState,
     begin_step,
     build_command,
-    is_out_of_date,
     navigate,
     note_clock_advance,
     speed_limit_mps,

@@ -23,7 +23,8 @@ from paani.messages import (
 )
 from paani.missions import mission_of_route
 from paani_services.navigator.guidance.mission_progress import MissionProgress
-from paani_services.navigator.navigate import NavigatorInputs, NavigatorState, navigate
+from paani_services.navigator.interlocks import NavigatorInputs
+from paani_services.navigator.navigate import NavigatorState, navigate
 
 NOW_US = 20_000_000
 PAPER = load_config(profile="paper").navigator

@@ -7,8 +7,9 @@ from hypothesis import strategies as st
 
 from paani import messages as m
 from paani.missions import mission_of_route
+from paani_services.navigator.interlocks import NavigatorInputs
 from paani_services.navigator.modes import follow_order
-from paani_services.navigator.navigate import NavigatorInputs, NavigatorState
+from paani_services.navigator.navigate import NavigatorState
 from tests.synthetic_water import AT_REST, CAMERA, CONFIG, START_US, evidence, odometry, water_edge_of
 
 PERIOD_US = 200_000

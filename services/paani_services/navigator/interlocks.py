@@ -1,0 +1,86 @@
+"""What the navigator has heard, and what about it forbids motion. Pure."""
+
+import math
+
+import msgspec
+
+from paani.config import NavigatorConfig
+from paani.messages import (
+    Advisory,
+    Arming,
+    Direction,
+    Evidence,
+    Inhibit,
+    Odometry,
+    OperatorOrder,
+    SimTime,
+    Tracks,
+)
+
+
+class NavigatorInputs(msgspec.Struct, frozen=True):
+    """The newest message of each kind, and when it was received [us]."""
+
+    advisory: Advisory | None = None
+    advisory_us: int = 0
+    odometry: Odometry | None = None
+    odometry_us: int = 0
+    clock: SimTime | None = None
+    clock_us: int = 0
+    arming: Arming | None = None
+    arming_us: int = 0
+    evidence: Evidence | None = None
+    tracks: Tracks | None = None
+    order: OperatorOrder | None = None
+    order_us: int = 0
+
+
+def is_out_of_date(stamp_us: int, limit_s: float, now_us: int, config: NavigatorConfig) -> bool:
+    """Whether a stamp is older than the limit, or of the future."""
+    return not -config.max_future_s <= (now_us - stamp_us) * 1e-6 <= limit_s
+
+
+def find_inhibits(
+    inputs: NavigatorInputs, clock_advanced_us: int | None, now_us: int, domain: int, config: NavigatorConfig
+) -> list[Inhibit]:
+    """Everything about the inputs that forbids motion (M8-M11).
+
+    clock_advanced_us: when simulated time last moved forward; None before it did.
+    """
+
+    def is_old(stamp_us: int, limit_s: float) -> bool:
+        return is_out_of_date(stamp_us, limit_s, now_us, config)
+
+    found: list[Inhibit] = []
+    advisory, odometry, clock, arming = inputs.advisory, inputs.odometry, inputs.clock, inputs.arming
+    messages = (advisory, odometry, clock, arming, inputs.evidence)
+    if any(message is not None and message.domain != domain for message in messages):
+        found.append(Inhibit.WRONG_DOMAIN)
+    if arming is None or not arming.armed or arming.stopped or is_old(inputs.arming_us, config.arming_max_age_s):
+        found.append(Inhibit.NOT_ARMED)
+    if clock is None or is_old(inputs.clock_us, config.clock_max_age_s):
+        found.append(Inhibit.NO_CLOCK)
+    elif not clock.running or clock_advanced_us is None or is_old(clock_advanced_us, config.clock_max_age_s):
+        found.append(Inhibit.CLOCK_STOPPED)
+    if odometry is None:
+        found.append(Inhibit.NO_ODOMETRY)
+    else:
+        if is_old(inputs.odometry_us, config.odometry_max_age_s) or is_old(
+            odometry.source_us, config.odometry_max_age_s
+        ):
+            found.append(Inhibit.STALE_ODOMETRY)
+        numbers = (odometry.x_m, odometry.y_m, odometry.yaw_rad)
+        if not odometry.healthy or not all(map(math.isfinite, numbers)):
+            found.append(Inhibit.UNHEALTHY_ODOMETRY)
+    if advisory is None:
+        found.append(Inhibit.NO_ADVISORY)
+    else:
+        if is_old(inputs.advisory_us, config.advisory_max_receipt_s) or is_old(
+            advisory.source_us, config.advisory_max_age_s
+        ):
+            found.append(Inhibit.STALE_ADVISORY)
+        if advisory.direction is Direction.STOP:
+            found.append(Inhibit.ADVISED_STOP)
+        elif advisory.direction is Direction.NO_DATA:
+            found.append(Inhibit.ADVISED_NO_DATA)
+    return found
