@@ -48,26 +48,24 @@ def find_inhibits(
     clock_advanced_us: when simulated time last moved forward; None before it did.
     """
 
-    def is_old(stamp_us: int, limit_s: float) -> bool:
-        return is_out_of_date(stamp_us, limit_s, now_us, config)
+    def is_old(limit_s: float, *stamps_us: int) -> bool:
+        return any(is_out_of_date(each, limit_s, now_us, config) for each in stamps_us)
 
     found: list[Inhibit] = []
     advisory, odometry, clock, arming = inputs.advisory, inputs.odometry, inputs.clock, inputs.arming
     messages = (advisory, odometry, clock, arming, inputs.evidence)
     if any(message is not None and message.domain != domain for message in messages):
         found.append(Inhibit.WRONG_DOMAIN)
-    if arming is None or not arming.armed or arming.stopped or is_old(inputs.arming_us, config.arming_max_age_s):
+    if arming is None or not arming.armed or arming.stopped or is_old(config.arming_max_age_s, inputs.arming_us):
         found.append(Inhibit.NOT_ARMED)
-    if clock is None or is_old(inputs.clock_us, config.clock_max_age_s):
+    if clock is None or is_old(config.clock_max_age_s, inputs.clock_us):
         found.append(Inhibit.NO_CLOCK)
-    elif not clock.running or clock_advanced_us is None or is_old(clock_advanced_us, config.clock_max_age_s):
+    elif not clock.running or clock_advanced_us is None or is_old(config.clock_max_age_s, clock_advanced_us):
         found.append(Inhibit.CLOCK_STOPPED)
     if odometry is None:
         found.append(Inhibit.NO_ODOMETRY)
     else:
-        if is_old(inputs.odometry_us, config.odometry_max_age_s) or is_old(
-            odometry.source_us, config.odometry_max_age_s
-        ):
+        if is_old(config.odometry_max_age_s, inputs.odometry_us, odometry.source_us):
             found.append(Inhibit.STALE_ODOMETRY)
         numbers = (odometry.x_m, odometry.y_m, odometry.yaw_rad)
         if not odometry.healthy or not all(map(math.isfinite, numbers)):
@@ -75,9 +73,8 @@ def find_inhibits(
     if advisory is None:
         found.append(Inhibit.NO_ADVISORY)
     else:
-        if is_old(inputs.advisory_us, config.advisory_max_receipt_s) or is_old(
-            advisory.source_us, config.advisory_max_age_s
-        ):
+        is_received_late = is_old(config.advisory_max_receipt_s, inputs.advisory_us)
+        if is_received_late or is_old(config.advisory_max_age_s, advisory.source_us):
             found.append(Inhibit.STALE_ADVISORY)
         if advisory.direction is Direction.STOP:
             found.append(Inhibit.ADVISED_STOP)

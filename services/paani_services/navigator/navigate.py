@@ -132,7 +132,9 @@ def navigate(
     leg, cross_m = describe_leg(state.progress, mission), setpoint.cross_track_m
     if inhibits:
         state = hold_cross_track(state, now_us)
-        state, at_station = _keep_station(state, inputs, inhibits, now_us, config, camera)
+        at_station = None
+        if is_planned and config.keep_station and may_keep_station(inhibits, advisory):
+            state, at_station = _keep_station(state, odometry, now_us, config)
         return state, build_command(state, inputs, now_us, inhibits, at_station=at_station, cross_m=cross_m, leg=leg)
     heading_rad, limit_mps = setpoint.course_rad, speed_limit_mps(advisory)
     speed_mps = min(setpoint.speed_mps, limit_mps)
@@ -191,17 +193,11 @@ def begin_step(
 
 
 def _keep_station(
-    state: NavigatorState,
-    inputs: NavigatorInputs,
-    inhibits: list[Inhibit],
-    now_us: int,
-    config: NavigatorConfig,
-    camera: Camera,
+    state: NavigatorState, odometry: Odometry, now_us: int, config: NavigatorConfig
 ) -> tuple[NavigatorState, StationSetpoint | None]:
-    """The state with the station that is kept, and what holds the boat there; None: no thrust."""
-    here, odometry = state.planner_state.memory.odom_pose, inputs.odometry
-    is_kept = config.keep_station and config.planner.acts_on(camera.calibration)
-    if not is_kept or not may_keep_station(inhibits, inputs.advisory) or here is None or odometry is None:
+    """The state with the station that is kept, and what holds the boat there; None, so no thrust, without its place."""
+    here = state.planner_state.memory.odom_pose
+    if here is None:
         return state, None
     here_m = (here.x_m, here.y_m)
     station = take_station(state.station, here_m, now_us, config)

@@ -50,9 +50,8 @@ def take_station(station: Station | None, here_m: tuple[float, float], now_us: i
         or math.dist((station.x_m, station.y_m), here_m) > LOST_M
     ):
         return Station(now_us, now_us, *here_m)
-    since_us = min(station.since_us, now_us)
-    if not has_passed(since_us, config.planner.brake_s * 1e6, now_us):
-        return Station(since_us, now_us, *here_m)
+    if not has_passed(station.since_us, config.planner.brake_s * 1e6, now_us):
+        return Station(station.since_us, now_us, *here_m)
     return msgspec.structs.replace(station, stopped_us=now_us)
 
 
