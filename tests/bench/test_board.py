@@ -57,7 +57,7 @@ def test_twelve_polls_of_the_papers_loop(tmp_path: Path, private_sets: tuple[str
     results = {(evidence.frame_epoch, evidence.frame_seq): evidence for evidence in seen}
     assert len(polls) == figures["polls"] == figures["answered"] + sum(figures["failures"].values()) == 12
     assert len(answers) == figures["answered"] >= 6
-    assert figures["learned"] == sum(evidence.cause is not UnusableCause.STALE for evidence in seen) >= 6
+    assert figures["learned"] == sum(evidence.cause is not UnusableCause.STALE for evidence in seen) > 0
     assert figures["unusable"] == sum(evidence.cause is UnusableCause.STALE for evidence in results.values())
     span_s = (polls[-1].at_us - polls[0].at_us) * 1e-6
     assert span_s > 10.9
