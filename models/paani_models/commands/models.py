@@ -112,6 +112,7 @@ def _parser() -> argparse.ArgumentParser:
     train.add_argument("--labels-from", type=Path, help="segmenter checkpoint that labels unsegmented pictures")
     train.add_argument("--stage", action="append", default=[], metavar="EPOCHSxHEIGHTxWIDTH", help="repeatable")
     train.add_argument("--epochs", type=int, help="detector and gate only")
+    train.add_argument("--batch", type=int, help="detector and segmenters: pictures a step; 16 if not given")
     train.add_argument("--peak-rate", type=float)
     train.add_argument(
         "--blend",
@@ -126,7 +127,7 @@ def _parser() -> argparse.ArgumentParser:
     train.add_argument("--draws", type=float, default=1.0, metavar="SHARE", help="detector: of an epoch's pictures")
     train.add_argument("--size", metavar="HEIGHTxWIDTH", help="detector: of its input; 320x416 if not given")
     train.add_argument("--unchecked", action="store_true", help="gate: also on the sequences that choose its threshold")
-    train.add_argument("--seed", type=int, metavar="N", help="segmenters only; 42 if not given")
+    train.add_argument("--seed", type=int, metavar="N", help="detector and segmenters; 42 if not given")
     train.add_argument(
         "--without",
         action="append",
@@ -278,6 +279,7 @@ def _train_or_export(arguments: argparse.Namespace) -> int:
             mean_with=arguments.mean_with,
             draws_frac=arguments.draws,
             size=arguments.size,
+            batch=arguments.batch,
             seed=arguments.seed,
             without=tuple(arguments.without),
         )

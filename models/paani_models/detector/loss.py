@@ -10,6 +10,7 @@ is penalised for a class only where the mask holds for every cell under it.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import torch
@@ -62,33 +63,36 @@ def log_scores(logits: Tensor) -> tuple[Tensor, Tensor]:
 def assign_simota(
     boxes: Tensor, log_p: Tensor, truth: Tensor, centres: Tensor, strides: Tensor
 ) -> tuple[Tensor, Tensor]:
-    """SimOTA: which object each candidate answers for.
+    """SimOTA: which object of its picture each candidate answers for.
 
-    boxes: [A,4] predicted corners. log_p: [A,C]. truth: [n,5], n >= 1. centres [A,2] and strides [A] of the candidates.
-    Returns the object index per candidate, -1 for none (int64 [A]), and its IoU (float32 [A], 0 for none).
+    boxes: [N,A,4] predicted corners. log_p: [N,A,C]. truth: [N,n,5] as `stack_truths` makes it, n >= 1. centres [A,2]
+    and strides [A] of the candidates.
+    Returns the object index per candidate, -1 for none (int64 [N,A]), and its IoU (float32 [N,A], 0 for none).
     """
-    target = truth[:, 1:]
-    inside = ((centres[None] > target[:, None, :2]) & (centres[None] < target[:, None, 2:])).all(2)
-    middle = (target[:, :2] + target[:, 2:]) / 2
-    near = ((centres[None] - middle[:, None]).abs() < CENTRE_RADIUS_STRIDES * strides[None, :, None]).all(2)
-    possible = (inside | near).any(0).nonzero().squeeze(1)
-    owner = torch.full((len(centres),), -1, dtype=torch.int64, device=boxes.device)
-    quality = torch.zeros(len(centres), device=boxes.device)
-    if len(possible) == 0:
-        return owner, quality
-    overlap = iou(target[:, None], boxes[None, possible])
-    cost = -log_p[possible][:, truth[:, 0].long()].T - IOU_COST * (overlap + 1e-8).log()
-    cost = cost + FAR_COST * (~(inside & near)[:, possible])
-    chosen = torch.zeros_like(cost, dtype=torch.bool)
-    wanted = overlap.topk(min(TOP_K, len(possible)), 1).values.sum(1).int().clamp(min=1)
-    for row, count in enumerate(wanted.tolist()):
-        chosen[row, cost[row].topk(count, largest=False).indices] = True
-    cost = cost.masked_fill(~chosen, torch.inf)
-    best, index = cost.min(0)
-    taken = best.isfinite()
-    owner[possible[taken]] = index[taken]
-    quality[possible[taken]] = overlap[index[taken], taken.nonzero().squeeze(1)]
-    return owner, quality
+    target, is_object = truth[:, :, 1:], (truth[:, :, 0] >= 0)[:, :, None]
+    inside = ((centres > target[:, :, None, :2]) & (centres < target[:, :, None, 2:])).all(3) & is_object
+    middle = (target[:, :, :2] + target[:, :, 2:]) / 2
+    near = ((centres - middle[:, :, None]).abs() < CENTRE_RADIUS_STRIDES * strides[:, None]).all(3) & is_object
+    is_possible = (inside | near).any(1, keepdim=True) & is_object
+    overlap = torch.where(is_possible, iou(target[:, :, None], boxes[:, None]), 0.0)
+    kinds = truth[:, :, :1].long().clamp(min=0).expand(-1, -1, len(centres))
+    cost = -log_p.transpose(1, 2).gather(1, kinds) - IOU_COST * (overlap + 1e-8).log() + FAR_COST * ~(inside & near)
+    cost = cost.masked_fill(~is_possible, torch.inf)
+    wanted = overlap.topk(TOP_K, 2).values.sum(2, keepdim=True).int().clamp(min=1)
+    cheapest = cost.topk(TOP_K, 2, largest=False)
+    is_taken = (torch.arange(TOP_K, device=cost.device) < wanted) & cheapest.values.isfinite()
+    chosen = torch.zeros_like(cost, dtype=torch.bool).scatter_(2, cheapest.indices, is_taken)
+    best, owner = cost.masked_fill(~chosen, torch.inf).min(1)
+    quality = overlap.gather(1, owner[:, None]).squeeze(1)
+    return torch.where(best.isfinite(), owner, -1), torch.where(best.isfinite(), quality, 0.0)
+
+
+def stack_truths(truths: Sequence[Tensor]) -> Tensor:
+    """Boxes [n,5] of each picture -> [N,m,5], m >= 1 the most of them; class -1 where a picture has no more."""
+    stacked = truths[0].new_full((len(truths), max(1, *map(len, truths)), 5), -1.0)
+    for row, truth in zip(stacked, truths, strict=True):
+        row[: len(truth)] = truth
+    return stacked
 
 
 def exhaustive_candidates(exhaustive_mask: Tensor) -> Tensor:
@@ -132,23 +136,19 @@ def detector_loss(
         silent = (weight < 0.5) & taught.known
         target, weight = target + silent * taught.scores, weight + silent
         sure = target.amax(2)
-    box_loss = boxes.sum() * 0.0
-    assigned = 0
-    for index, truth in enumerate(truths):
-        if len(truth) == 0:
-            continue
-        owner, quality = assign_simota(corners[index], log_p[index], truth, centres, strides)
-        own = (owner >= 0).nonzero().squeeze(1)
-        objects = truth[owner[own]]
-        sure[index, own] = 0.0
-        target[index, own] = 0.0
-        target[index, own, objects[:, 0].long()] = quality[own].sqrt()
-        weight[index, own] = 1.0
-        box_loss = box_loss + (1.0 - generalised_iou(corners[index, own], objects[:, 1:])).sum()
-        assigned += len(own)
+    truth = stack_truths(truths)
+    owner, quality = assign_simota(corners, log_p, truth, centres, strides)
+    own = owner >= 0
+    objects = truth.gather(1, owner.clamp(min=0)[..., None].expand(-1, -1, truth.shape[2]))
+    answers = F.one_hot(objects[..., 0].long().clamp(min=0), target.shape[2]) * quality.sqrt()[..., None]
+    target, weight = torch.where(own[..., None], answers, target), weight.masked_fill(own[..., None], 1.0)
+    sure = sure.masked_fill(own, 0.0)
+    box_loss = (own * (1.0 - generalised_iou(corners, objects[..., 1:]))).sum()
+    assigned = own.sum()
     if taught is not None:
         sure = sure * (sure > TAUGHT_BOX_MIN_SCORE)
         box_loss = box_loss + (sure * (1.0 - generalised_iou(corners, box_corners(taught.boxes)))).sum()
-        assigned += int((sure > 0).sum())
+        assigned = assigned + (sure > 0).sum()
     score_loss = -(weight * (target * log_p + (1.0 - target) * log_not_p)).sum()
-    return BOX_GAIN * box_loss / max(1, assigned), SCORE_GAIN * score_loss / max(1, assigned)
+    share = 1.0 / assigned.clamp(min=1)
+    return BOX_GAIN * box_loss * share, SCORE_GAIN * score_loss * share

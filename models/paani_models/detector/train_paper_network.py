@@ -105,7 +105,7 @@ class Yolo11nTraining:
         cv_seed = (recipe.seed, epoch)
         self.model.train()
         losses = []
-        batches = Prefetch[Batch](recipe.workers, 2 * recipe.workers)(lambda i: self._batch(order, i, cv_seed), steps)
+        batches = Prefetch[Batch](recipe.workers)(lambda i: self._batch(order, i, cv_seed), steps)
         for index, (pictures, truths, judged) in enumerate(tqdm(batches, f"epoch {epoch + 1}/{recipe.epochs}", steps)):
             with mixed_precision():
                 boxes, bins, logits = self.model.raw(to_device(pictures))

@@ -67,6 +67,7 @@ class TrainingOptions:
     mean_with: Path | None = None
     draws_frac: float = 1.0
     size: str | None = None
+    batch: int | None = None
     seed: int | None = None
     without: tuple[str, ...] = ()
 
@@ -104,12 +105,20 @@ def parse_size(text: str) -> tuple[int, int]:
     return stage.height_px, stage.width_px
 
 
+def _parse_batch(options: TrainingOptions) -> int | None:
+    """Raises UserError for no picture a step."""
+    if options.batch is not None and options.batch < 1:
+        raise UserError(f"--batch: {options.batch} is less than 1")
+    return options.batch
+
+
 def _train_segmenter(net: str, pictures: PictureSelection, options: TrainingOptions) -> None:
     recipe = IMAGENET_RECIPE if net == "segmenter" else PAPER_RECIPE
     recipe = replace(
         recipe,
         stages=parse_stages(options.stages) or recipe.stages,
         peak_rate=options.peak_rate or recipe.peak_rate,
+        batch=_parse_batch(options) or recipe.batch,
         seed=recipe.seed if options.seed is None else options.seed,
         without=options.without,
     )
@@ -149,6 +158,8 @@ def _train_detector(pictures: PictureSelection, options: TrainingOptions) -> Non
         recipe,
         epochs=options.epochs or recipe.epochs,
         peak_rate=options.peak_rate or recipe.peak_rate,
+        batch=_parse_batch(options) or recipe.batch,
+        seed=recipe.seed if options.seed is None else options.seed,
         draws_frac=options.draws_frac,
         distilled=keeps,
     )

@@ -178,7 +178,7 @@ class SegmenterTraining:
 
         self.model.train()
         losses = []
-        batches = Prefetch[tuple[Tensor, Tensor]](recipe.workers, 2 * recipe.workers)
+        batches = Prefetch[tuple[Tensor, Tensor]](recipe.workers)
         title = f"epoch {epoch + 1}/{recipe.epochs} {stage.width_px}x{stage.height_px}"
         for pictures, masks in tqdm(batches(make, steps), title, steps, mininterval=5.0):
             loss = self._loss(to_device(pictures), to_device(masks))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from copy import deepcopy
@@ -71,10 +72,11 @@ class AveragedWeights:
 
 
 class Prefetch(Generic[Batch]):
-    """Batches in order, `ahead` of them being made in `workers` threads while the network trains."""
+    """Batches in order, made in `workers` threads, by default one a core, twice as many ahead, while the net trains."""
 
-    def __init__(self, workers: int = 2, ahead: int = 4) -> None:
-        self.workers, self.ahead = workers, ahead
+    def __init__(self, workers: int | None = None) -> None:
+        self.workers = workers or os.cpu_count() or 2
+        self.ahead = 2 * self.workers
 
     def __call__(self, make: Callable[[int], Batch], count: int) -> Iterator[Batch]:
         """Yield make(0) .. make(count - 1)."""

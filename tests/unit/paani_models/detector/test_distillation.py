@@ -69,7 +69,7 @@ def test_what_people_drew_outdoes_the_teacher() -> None:
     logits = torch.zeros(1, len(centres), 5)
     silent = torch.zeros(1, 4, 8, 8, dtype=torch.bool)
     drawn = torch.tensor([[0.0, 8, 8, 24, 24]])
-    owner, _ = assign_simota(box_corners(boxes[0]), log_scores(logits)[0][0], drawn, centres, strides)
+    (owner,), _ = assign_simota(box_corners(boxes), log_scores(logits)[0], drawn[None], centres, strides)
     own = owner >= 0
     known = torch.tensor([True, True, False, False])
     says_no, says_vessel = torch.zeros(1, len(centres), 4), torch.zeros(1, len(centres), 4)

@@ -13,6 +13,7 @@ from paani_models.detector.loss import (  # noqa: E402
     exhaustive_candidates,
     generalised_iou,
     iou,
+    stack_truths,
 )
 from paani_models.detector.shipped_network import candidate_grid  # noqa: E402
 
@@ -30,6 +31,14 @@ def as_cells() -> Tensor:
     return cells
 
 
+def assign(*pictures: list[list[float]]) -> list[tuple[Tensor, Tensor]]:
+    """Owner and IoU of each candidate, picture by picture, where every candidate predicts its own cell."""
+    boxes, log_p = box_corners(as_cells()), torch.full((len(pictures), CANDIDATES, 4), -1.0)
+    truth = stack_truths([torch.tensor(each).reshape(-1, 5) for each in pictures])
+    owners, qualities = assign_simota(boxes.expand(len(pictures), -1, -1), log_p, truth, *candidate_grid(*SIZE_HW))
+    return list(zip(owners, qualities, strict=True))
+
+
 def judge(*classes: int) -> Tensor:
     judged: Tensor = torch.zeros(1, 4, *CELLS, dtype=torch.bool)
     judged[:, list(classes)] = True
@@ -45,20 +54,25 @@ def test_iou_and_giou_by_hand() -> None:
 
 
 def test_the_cell_that_fits_the_object_answers_for_it() -> None:
-    boxes = box_corners(as_cells())
-    centres, strides = candidate_grid(*SIZE_HW)
-    truth = torch.tensor([[VESSEL, 24.0, 24.0, 32.0, 32.0]])
-    owner, quality = assign_simota(boxes, torch.full((CANDIDATES, 4), -1.0), truth, centres, strides)
+    ((owner, quality),) = assign([[VESSEL, 24.0, 24.0, 32.0, 32.0]])
     assert owner.tolist().count(0) == 1
     assert int(quality.argmax()) == 3 * 8 + 3
     assert float(quality.max()) == pytest.approx(1.0)
 
 
 def test_overlapping_objects_each_keep_candidates_of_their_own() -> None:
-    centres, strides = candidate_grid(*SIZE_HW)
-    truth = torch.tensor([[VESSEL, 8.0, 8.0, 40.0, 40.0], [BUOY, 24.0, 24.0, 56.0, 56.0]])
-    owner, _ = assign_simota(box_corners(as_cells()), torch.full((CANDIDATES, 4), -1.0), truth, centres, strides)
+    ((owner, _),) = assign([[VESSEL, 8.0, 8.0, 40.0, 40.0], [BUOY, 24.0, 24.0, 56.0, 56.0]])
     assert {0, 1} <= set(owner.tolist())
+
+
+def test_what_answers_in_a_picture_does_not_depend_on_the_others_of_its_batch() -> None:
+    crowd = [[VESSEL, 4.0 * k, 4.0 * k, 4.0 * k + 16.0, 4.0 * k + 16.0] for k in range(12)]
+    pictures = [[[BUOY, 24.0, 24.0, 56.0, 56.0]], [], crowd]
+    together, alone = assign(*pictures), [assign(each)[0] for each in pictures]
+    assert all(
+        torch.equal(a, b) for one, other in zip(together, alone, strict=True) for a, b in zip(one, other, strict=True)
+    )
+    assert [int((owner >= 0).any()) for owner, _ in together] == [1, 0, 1]
 
 
 def test_background_is_punished_only_for_judged_classes() -> None:

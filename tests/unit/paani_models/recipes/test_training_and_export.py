@@ -276,7 +276,7 @@ def test_averaged_weights_follow_but_lag() -> None:
 
 
 def test_prefetch_keeps_the_order_and_passes_errors_on() -> None:
-    assert list(Prefetch[int](workers=2, ahead=3)(lambda i: i * i, 10)) == [i * i for i in range(10)]
+    assert list(Prefetch[int](workers=2)(lambda i: i * i, 10)) == [i * i for i in range(10)]
     with pytest.raises(ZeroDivisionError):
         list(Prefetch[float]()(lambda i: 1 / (3 - i), 5))
 
