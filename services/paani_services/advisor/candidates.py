@@ -69,7 +69,7 @@ def _recognised_boxes(tracks: TrackerState, config: Config) -> tuple[BoxXyxy, ..
     """Boxes of confirmed tracks that are surely something else than a person."""
     return tuple(
         track.box
-        for track in tracks.tracks
+        for track in tracks.in_view
         if track.label != "person"
         and is_confirmed(track, config.advisor.tracker)
         and track.display_confidence >= config.advisor.people.recognised_confidence

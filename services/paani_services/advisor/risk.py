@@ -11,7 +11,7 @@ from paani import portable
 from paani.arrays import F64, Bools
 from paani.config import CalibrationConfig, Config, CorridorConfig, RiskConfig
 from paani.geometry import clip
-from paani.messages import BoxXyxy, Evidence, LaneEvidence, SegmentationSource
+from paani.messages import BoxXyxy, Evidence, LaneEvidence, RotationUse, SegmentationSource
 from paani_services.advisor.tracker import (
     TrackerState,
     TrackMemory,
@@ -195,6 +195,7 @@ def obstacles_from_tracks(
     that the mask shows clear; without it, not the centre where the mask shows the quay end above `occupancy_bottom`.
     """
     settings, sees_people = config.advisor.tracker, config.advisor.people.use
+    is_turn_known = state.rotation is RotationUse.KNOWN  # so that a held box is where it shows
     open_lanes: tuple[str, ...] = ()
     if config.is_planner_active:
         clear = 1.0 - config.advisor.policy.planned_coverage
@@ -225,9 +226,9 @@ def obstacles_from_tracks(
             is_person=track.label == "person",
             is_confirmed=is_confirmed(track, settings),
             distance_m=foot_range_m(track.box, aspect, config.calibration),
-            is_ashore=sees_people and not track.held and stands_ashore(track.box, water_edge),
+            is_ashore=sees_people and (is_turn_known or not track.held) and stands_ashore(track.box, water_edge),
         )
-        for track in state.tracks
+        for track in state.in_view
         if track.box[3] > config.perception.corridors.top
         and (is_accepted(track, settings) or (sees_people and track.label == "person"))
     )

@@ -2,7 +2,7 @@
 
 Greedy association by overlap (G2), two sightings to confirm (G4), a fixed hold after the last sighting (G3), and
 neither a motion filter nor re-identification (G10): an unseen box stays where it was until its hold ends. What is ours:
-the boat's rotation decides which identity a box continues, and nothing else.
+where it was is a direction, so that the boat's rotation moves the box in the picture, as far as it is known.
 """
 
 import itertools
@@ -69,12 +69,12 @@ class Identity(msgspec.Struct, frozen=True):
     motion: MotionHistory = MotionHistory()
 
 
-class TrackMemory(msgspec.Struct, frozen=True, rename={"attitude": "seen_from", "is_vacated": "left"}):
-    """One track: a place in the picture where something is or was.
+class TrackMemory(msgspec.Struct, frozen=True, rename={"attitude": "seen_from", "is_out_of_view": "left"}):
+    """One track: a direction in which something is or was.
 
-    `box` is the last one detected there, `display_*` are smoothed (G6, G7), `hits` counts detections there. `identity`
-    may have come from another place when the boat turned, and counts its own detections. `attitude`: of the boat at the
-    last detection. `is_vacated`: the identity continues elsewhere, so that no detection is predicted from here.
+    `box` is where it is in the newest picture, `seen_box` where it was last detected, with the boat in `attitude`; they
+    differ while it is held and the boat turns. `display_*` are smoothed (G6, G7). `is_out_of_view`: the boat has turned
+    away from it.
     """
 
     identity: Identity
@@ -87,7 +87,8 @@ class TrackMemory(msgspec.Struct, frozen=True, rename={"attitude": "seen_from", 
     urgency: float
     held: bool = False
     attitude: Attitude | None = None
-    is_vacated: bool = False
+    seen_box: BoxXyxy | None = None  # None: `box`
+    is_out_of_view: bool = False
 
     @property
     def id(self) -> int:
@@ -106,6 +107,11 @@ class TrackerState(msgspec.Struct, frozen=True, rename={"epoch_changed": "began_
     malformed: int = 0
     attitudes: tuple[Attitude, ...] = ()
     rotation: RotationUse = RotationUse.OFF
+
+    @property
+    def in_view(self) -> Iterator[TrackMemory]:
+        """The tracks that the boat has not turned away from."""
+        return (track for track in self.tracks if not track.is_out_of_view)
 
     @property
     def period_s(self) -> float:
@@ -132,8 +138,7 @@ def remember_attitude(state: TrackerState, odometry: Odometry | None) -> Tracker
 def update_tracks(state: TrackerState, evidence: Evidence, config: Config) -> TrackerState:
     """Update the tracks with the detections of one new frame; an unusable frame only lets holds run out.
 
-    The caller passes each distinct frame once. Malformed boxes are left out and counted. Boxes, holds and weights
-    follow overlap with the last box alone, whatever the rotation; identities follow the predicted boxes.
+    The caller passes each distinct frame once. Malformed boxes are left out and counted.
     """
     settings = config.advisor.tracker
     state = _advance_clock(state, evidence)
@@ -146,34 +151,24 @@ def update_tracks(state: TrackerState, evidence: Evidence, config: Config) -> Tr
         state.epoch_changed,
         config.advisor,
     )
-    matched, identities = _assign_detections(state.tracks, valid, frame)
-    continued, new_ids = set(identities.track_of.values()), itertools.count(state.next_id)
-    detection_of = {t: d for d, t in matched.track_of.items()}
+    seen = [track.seen_box or track.box for track in state.tracks]
+    places = predict_boxes([(box, track.attitude) for box, track in zip(seen, state.tracks, strict=True)], frame.view)
+    assigned = _assign_detections(seen, places, valid, frame)
+    new_ids = itertools.count(state.next_id)
+    detection_of = {t: d for d, t in assigned.track_of.items()}
     tracks = []
-    for t, track in enumerate(state.tracks):
+    for t, (track, place) in enumerate(zip(state.tracks, places, strict=True)):
         if t in detection_of:
             d = detection_of[t]
-            tracks.append(
-                _update_track(
-                    track, valid[d], _update_identity(d, valid[d], state.tracks, identities, new_ids, frame), frame
-                )
-            )
+            identity = _update_identity(track.identity, valid[d], frame, is_ambiguous=d in assigned.ambiguous)
+            tracks.append(_update_track(track, place or seen[t], valid[d], identity, frame))
         else:
-            is_vacated = t in continued
-            tracks.append(
-                msgspec.structs.replace(
-                    track,
-                    identity=Identity(next(new_ids), frame.at_us) if is_vacated else track.identity,
-                    held=True,
-                    seen_us=min(track.seen_us, frame.at_us),
-                    is_vacated=track.is_vacated or is_vacated,
-                )
-            )
-    tracks += [
-        _new_track(detection, _update_identity(d, detection, state.tracks, identities, new_ids, frame), frame)
-        for d, detection in enumerate(valid)
-        if d not in matched.track_of
-    ]
+            tracks.append(_hold_track(track, place, frame))
+    for d, detection in enumerate(valid):
+        if d not in assigned.track_of:
+            history = MotionHistory(reset_cause=MotionCause.EPOCH_CHANGE if frame.epoch_changed else MotionCause.NONE)
+            identity = Identity(next(new_ids), frame.at_us, motion=history)
+            tracks.append(_new_track(detection, _update_identity(identity, detection, frame), frame))
     alive = [t for t in tracks if (frame.at_us - t.seen_us) * 1e-6 < settings.hold_s]
     newest = sorted(range(len(alive)), key=lambda i: (-alive[i].seen_us, -alive[i].display_confidence, i))
     return msgspec.structs.replace(
@@ -199,19 +194,12 @@ def _advance_clock(state: TrackerState, evidence: Evidence) -> TrackerState:
 
 
 def _assign_detections(
-    tracks: tuple[TrackMemory, ...], valid: list[Detection], frame: _Frame
-) -> tuple[Assignment, Assignment]:
-    """Assign to each detection the track at its place, and the track whose identity it continues."""
+    seen: list[BoxXyxy], places: list[BoxXyxy | None], valid: list[Detection], frame: _Frame
+) -> Assignment:
+    """The track of each detection: by where tracks are, else, ambiguously, by where they were last detected."""
     boxes, min_iou = [d.box_xyxy for d in valid], frame.config.tracker.iou
-    places = [track.box for track in tracks]
     by_place = assign_boxes(places, boxes, min_iou)
-    if frame.view.attitude is None:
-        return by_place, by_place
-    rotated = predict_boxes([(track.box, track.attitude) for track in tracks], frame.view)
-    if rotated == places:
-        return by_place, by_place
-    predicted = [None if track.is_vacated else place for track, place in zip(tracks, rotated, strict=True)]
-    return by_place, merge_assignments(by_place, assign_boxes(predicted, boxes, min_iou))
+    return by_place if places == seen else merge_assignments(assign_boxes(seen, boxes, min_iou), by_place)
 
 
 def is_valid_box(detection: Detection | Candidate) -> bool:
@@ -260,7 +248,7 @@ def tracks_message(state: TrackerState, evidence: Evidence, config: AdvisorConfi
         frame_epoch=evidence.frame_epoch,
         tracks=tuple(
             _track_message(track, 0 if track.held else numbers.get(track.box, 0), state.at_us, window, config)
-            for track in state.tracks
+            for track in state.in_view
         ),
         rotation=state.rotation,
         period_s=state.period_s,
@@ -296,29 +284,29 @@ def _track_message(
     )
 
 
-def _update_identity(
-    d: int,
-    detection: Detection,
-    tracks: tuple[TrackMemory, ...],
-    identities: Assignment,
-    new_ids: Iterator[int],
-    frame: _Frame,
-) -> Identity:
-    """The identity of detection `d` with this sighting added; a new one where it continues none."""
-    if d in identities.track_of:
-        before = tracks[identities.track_of[d]].identity
-    else:
-        history = MotionHistory(reset_cause=MotionCause.EPOCH_CHANGE if frame.epoch_changed else MotionCause.NONE)
-        before = Identity(next(new_ids), frame.at_us, motion=history)
+def _update_identity(before: Identity, detection: Detection, frame: _Frame, *, is_ambiguous: bool = False) -> Identity:
+    """The identity with this sighting added."""
     size = log_angular_size(detection.box_xyxy, frame.view.lens)
-    measurement = SizeMeasurement(
-        frame.at_us, detection.box_xyxy, size, detection.confidence, d in identities.ambiguous
-    )
+    measurement = SizeMeasurement(frame.at_us, detection.box_xyxy, size, detection.confidence, is_ambiguous)
     return Identity(
         id=before.id,
         born_us=min(before.born_us, frame.at_us),
         hits=before.hits + 1,
         motion=add_measurement(before.motion, measurement, frame.window, frame.config.motion),
+    )
+
+
+def _hold_track(track: TrackMemory, place: BoxXyxy | None, frame: _Frame) -> TrackMemory:
+    """The track in a picture that does not show it; where the rotation is not known it stays where it was."""
+    held = msgspec.structs.replace(track, held=True, seen_us=min(track.seen_us, frame.at_us))
+    if frame.view.attitude is None:
+        return held
+    return msgspec.structs.replace(
+        held,
+        box=place or track.box,
+        display_box=place or track.display_box,
+        seen_box=track.seen_box or track.box,
+        is_out_of_view=place is None,
     )
 
 
@@ -336,7 +324,10 @@ def _new_track(detection: Detection, identity: Identity, frame: _Frame) -> Track
     )
 
 
-def _update_track(track: TrackMemory, detection: Detection, identity: Identity, frame: _Frame) -> TrackMemory:
+def _update_track(
+    track: TrackMemory, place: BoxXyxy, detection: Detection, identity: Identity, frame: _Frame
+) -> TrackMemory:
+    """The track with this sighting. place: where the rotation has moved the box of the last one."""
     settings, box = frame.config.tracker, detection.box_xyxy
     return TrackMemory(
         identity=identity,
@@ -346,18 +337,18 @@ def _update_track(track: TrackMemory, detection: Detection, identity: Identity, 
         display_confidence=_smooth(track.display_confidence, detection.confidence, settings.confidence_retain),
         hits=track.hits + 1,
         seen_us=frame.at_us,
-        urgency=_urgency(track, box, frame.at_us, settings),
+        urgency=_urgency(track, place, box, frame.at_us, settings),
         attitude=frame.view.attitude,
     )
 
 
-def _urgency(track: TrackMemory, box: BoxXyxy, at_us: int, config: TrackerConfig) -> float:
+def _urgency(track: TrackMemory, place: BoxXyxy, box: BoxXyxy, at_us: int, config: TrackerConfig) -> float:
     """The larger of growth (H1) and motion towards the picture's centre (H2), each saturated at 1 (H3)."""
     elapsed_s = (at_us - track.seen_us) * 1e-6
     if elapsed_s <= 0.0:
         return track.urgency
-    growth = (math.sqrt(area(box)) - math.sqrt(area(track.box))) / elapsed_s
-    centering = (_distance_from_centre(track.box) - _distance_from_centre(box)) / elapsed_s
+    growth = (math.sqrt(area(box)) - math.sqrt(area(place))) / elapsed_s
+    centering = (_distance_from_centre(place) - _distance_from_centre(box)) / elapsed_s
     return clip(max(growth / config.growth_full_scale_per_s, centering / config.centering_full_scale_per_s), 0.0, 1.0)
 
 
