@@ -105,23 +105,42 @@ def parse_size(text: str) -> tuple[int, int]:
     return stage.height_px, stage.width_px
 
 
-def _parse_batch(options: TrainingOptions) -> int | None:
-    """Raises UserError for no picture a step."""
-    if options.batch is not None and options.batch < 1:
-        raise UserError(f"--batch: {options.batch} is less than 1")
-    return options.batch
-
-
-def _train_segmenter(net: str, pictures: PictureSelection, options: TrainingOptions) -> None:
+def segmenter_recipe(net: str, options: TrainingOptions) -> SegmenterRecipe:
+    """What decides a training of this segmenter. Raises UserError naming an option that is malformed."""
     recipe = IMAGENET_RECIPE if net == "segmenter" else PAPER_RECIPE
-    recipe = replace(
+    return replace(
         recipe,
         stages=parse_stages(options.stages) or recipe.stages,
         peak_rate=options.peak_rate or recipe.peak_rate,
-        batch=_parse_batch(options) or recipe.batch,
+        batch=_batch(options, recipe.batch),
         seed=recipe.seed if options.seed is None else options.seed,
         without=options.without,
     )
+
+
+def detector_recipe(options: TrainingOptions) -> DetectorRecipe:
+    """What decides a training of the detector. Raises UserError naming an option that is malformed."""
+    height_px, width_px = parse_size(options.size) if options.size else DETECTOR_SIZE_WH[::-1]
+    recipe = DetectorRecipe(height_px=height_px, width_px=width_px)
+    return replace(
+        recipe,
+        epochs=options.epochs or recipe.epochs,
+        peak_rate=options.peak_rate or recipe.peak_rate,
+        batch=_batch(options, recipe.batch),
+        seed=recipe.seed if options.seed is None else options.seed,
+        draws_frac=options.draws_frac,
+        distilled=options.blend is not None,
+    )
+
+
+def _batch(options: TrainingOptions, usual: int) -> int:
+    if options.batch is not None and options.batch < 1:
+        raise UserError(f"--batch: {options.batch} is less than 1")
+    return options.batch or usual
+
+
+def _train_segmenter(net: str, pictures: PictureSelection, options: TrainingOptions) -> None:
+    recipe = segmenter_recipe(net, options)
     torch.manual_seed(recipe.seed)
     model: ShippedSegmenter | PaperSegmenter = PaperSegmenter()
     if net == "segmenter":
@@ -151,18 +170,7 @@ def _train_segmenter(net: str, pictures: PictureSelection, options: TrainingOpti
 
 
 def _train_detector(pictures: PictureSelection, options: TrainingOptions) -> None:
-    height_px, width_px = parse_size(options.size) if options.size else DETECTOR_SIZE_WH[::-1]
-    recipe = DetectorRecipe(height_px=height_px, width_px=width_px)
-    keeps = options.blend is not None
-    recipe = replace(
-        recipe,
-        epochs=options.epochs or recipe.epochs,
-        peak_rate=options.peak_rate or recipe.peak_rate,
-        batch=_parse_batch(options) or recipe.batch,
-        seed=recipe.seed if options.seed is None else options.seed,
-        draws_frac=options.draws_frac,
-        distilled=keeps,
-    )
+    recipe = detector_recipe(options)
     torch.manual_seed(recipe.seed)
     model = start_detector(pictures.data, options)
     cached = read_boxed_pictures(pictures.boxed_samples(held_out=False))
@@ -176,7 +184,7 @@ def _train_detector(pictures: PictureSelection, options: TrainingOptions) -> Non
         found = options.folder / "teachers_boxes.json"
         cached = add_teachers_boxes(cached, open_off_the_shelf(pictures.data, torch.get_num_threads()), found)
     training = DetectorTraining(model, recipe, options.folder, cached, held_out, teacher)
-    if keeps:
+    if recipe.distilled:
         training.state.average_from_model()
     training.run()
 

@@ -30,8 +30,10 @@ from paani_models.recipes.onnx_export import (  # noqa: E402
 )
 from paani_models.recipes.train_and_export import (  # noqa: E402
     TrainingOptions,
+    detector_recipe,
     parse_size,
     parse_stages,
+    segmenter_recipe,
     start_detector,
     take_share,
 )
@@ -138,6 +140,20 @@ def test_another_recipe_does_not_resume(tmp_path: Path, river: list[CachedPictur
     other = SegmenterTraining(PaperSegmenter(), replace(SMALL, peak_rate=0.5), tmp_path, river, river)
     with pytest.raises(UserError, match=r"last\.pt: was made with another recipe"):
         other.run()
+
+
+def test_a_training_takes_its_batch_and_seed_from_the_options(tmp_path: Path) -> None:
+    options = TrainingOptions(tmp_path, batch=64, seed=7)
+    for recipe in (detector_recipe(options), segmenter_recipe("segmenter", options)):
+        assert (recipe.batch, recipe.seed) == (64, 7)
+    usual = detector_recipe(TrainingOptions(tmp_path))
+    assert (usual.batch, usual.seed, usual.distilled) == (16, 42, False)
+    for wrong in (
+        lambda: detector_recipe(replace(options, batch=0)),
+        lambda: segmenter_recipe("segmenter", replace(options, batch=0)),
+    ):
+        with pytest.raises(UserError, match="--batch: 0"):
+            wrong()
 
 
 @pytest.mark.train
