@@ -21,8 +21,8 @@ def draw_severity_curves(cells: Sequence[LevelFigures]) -> str:
     parts = [
         element("rect", width=width, height=height, fill="#fff"),
         element("text", "refused by the image-quality check", x=LEFT, y=16, fill=REFUSED),
-        element("text", "mIoU of the segmenter (dashed)", x=LEFT + 130, y=16, fill=MIOU),
-        element("text", "band: either verdict will do; severity 1 to 5", x=LEFT + 330, y=16, fill=NOTE),
+        element("text", "mIoU of the segmenter (dashed)", x=LEFT + 230, y=16, fill=MIOU),
+        element("text", "band: either verdict will do; severity 1 to 5", x=LEFT + 430, y=16, fill=NOTE),
     ]
     for index, name in enumerate(names):
         row, column = divmod(index, COLUMNS)
