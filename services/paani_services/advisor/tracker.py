@@ -297,10 +297,10 @@ def _update_identity(before: Identity, detection: Detection, frame: _Frame, *, i
 
 
 def _hold_track(track: TrackMemory, place: BoxXyxy | None, frame: _Frame) -> TrackMemory:
-    """The track in a picture that does not show it; where the rotation is not known it stays where it was."""
+    """The track in a picture that does not show it; with an unknown rotation, where it was in view last."""
     held = msgspec.structs.replace(track, held=True, seen_us=min(track.seen_us, frame.at_us))
     if frame.view.attitude is None:
-        return held
+        return msgspec.structs.replace(held, is_out_of_view=False)
     return msgspec.structs.replace(
         held,
         box=place or track.box,

@@ -309,6 +309,17 @@ def test_without_a_known_rotation_a_held_box_stays_in_the_picture() -> None:
     assert np.ptp(np.array(places), axis=0).max() < 1e-12
 
 
+def test_whoever_the_boat_turned_away_from_counts_again_when_the_rotation_is_not_known_any_more() -> None:
+    somebody, state, counted = box(m.Label.PERSON, (0.45, 0.4, 0.55, 0.6)), AdvisorState(), []
+    for k, (yaw_rad, later_s) in enumerate(((0.0, 0.0), (0.0, 0.2), (1.5, 0.4), (1.5, 1.5))):
+        at_us = T0_US + round(later_s * 1e6)
+        frame = msgspec.structs.replace(seeing(*[somebody] * (k < 2)), source_us=at_us, frame_seq=k)
+        heard = odometry(min(at_us, T0_US + 400_000), yaw_rad)  # nothing after that
+        state, advisory, tracks = advise(state, frame, at_us, PAANI, heard)
+        counted.append((tracks.rotation is U.KNOWN, len(tracks.tracks), bool(advisory.people_ahead)))
+    assert counted[1:] == [(True, 1, True), (True, 0, False), (False, 1, True)]
+
+
 @pytest.mark.parametrize("rate_radps", [0.5, -0.5])
 @pytest.mark.parametrize("period_s", [0.2, 0.5])
 def test_one_thing_is_one_obstacle_while_the_boat_turns(rate_radps: float, period_s: float) -> None:
