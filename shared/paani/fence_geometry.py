@@ -118,7 +118,7 @@ def find_route_violation(
 def _exit_part(fence: Fence, from_m: Point, to_m: Point) -> float | None:
     """The part of the way after which something between its ends is not allowed; None where there is nothing."""
     cuts = sorted(cut for area in fence for edge in edges(area) for cut in _crossings(from_m, to_m, *edge))
-    for cut, beyond in pairwise((*cuts, 1.0)):
+    for cut, beyond in pairwise((0.0, *cuts, 1.0)):
         if not is_allowed(fence, _interpolate(from_m, to_m, 0.5 * (cut + beyond))):
             return cut
     return None

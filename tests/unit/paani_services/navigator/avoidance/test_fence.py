@@ -77,6 +77,7 @@ def test_areas_that_keep_in_join() -> None:
     st.tuples(st.floats(-12, 12), st.floats(-12, 12)),
     st.sampled_from(Keep),
 )
+@example([(3.0, 0.2), (2.0, 0.5), (2.0, 0.5), (2.0, 0.5)], (2.0, 0.0), (0.0, 0.0), Keep.OUT)  # from a corner inwards
 @settings(max_examples=60, deadline=None)
 def test_allowed_distance_agrees_with_probing_along_the_line(
     spokes: list[tuple[float, float]], start: tuple[float, float], end: tuple[float, float], keep: Keep
