@@ -71,8 +71,7 @@ class DetectorConfig(Section, frozen=True):
     """A box counts above `confidence`, or above the threshold of its own class where that is not 0."""
 
     confidence: Fraction = 0.40  # C6
-    # Of boxes above it three in four are right on held-out photographs; below it, one counts where it stands in water.
-    person_confidence: Fraction = 0.50  # 0: as `confidence`; lower finds more people, and more that are none
+    person_confidence: Fraction = 0.0  # 0: as `confidence`; lower finds more people, and more that are none
     vessel_confidence: Fraction = 0.0  # 0: as `confidence`
     pier_confidence: Fraction = 0.0  # 0: as `confidence`
     buoy_confidence: Fraction = 0.0  # 0: as `confidence`

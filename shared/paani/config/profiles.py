@@ -13,7 +13,6 @@ PAPER: dict[str, object] = {
         "concurrent": False,  # B4
         "intra_op_threads": 2,  # C14, D11
         "corridors": {"open_water": False},  # J5: risk alone
-        "detections": {"person_confidence": 0.0},  # C6: one threshold
         "candidates": {"use": False},  # C6: what is below the threshold is nothing
         "follow_roll": False,  # E3: corridors are fixed in the picture
         "image_quality": {"enabled": False},  # J19
