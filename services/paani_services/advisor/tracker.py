@@ -198,8 +198,8 @@ def _assign_detections(
 ) -> Assignment:
     """The track of each detection: by where tracks are, else, ambiguously, by where they were last detected."""
     boxes, min_iou = [d.box_xyxy for d in valid], frame.config.tracker.iou
-    by_place = assign_boxes(places, boxes, min_iou)
-    return by_place if places == seen else merge_assignments(assign_boxes(seen, boxes, min_iou), by_place)
+    by_prediction = assign_boxes(places, boxes, min_iou)
+    return by_prediction if places == seen else merge_assignments(assign_boxes(seen, boxes, min_iou), by_prediction)
 
 
 def is_valid_box(detection: Detection | Candidate) -> bool:
