@@ -8,6 +8,7 @@ import math
 
 import msgspec
 
+from paani.clock import has_passed
 from paani.config import NavigatorConfig
 from paani.fence_geometry import Fence, is_allowed
 from paani.geometry import wrap_rad
@@ -20,6 +21,7 @@ from paani.messages import (
     Odometry,
 )
 from paani.motion_planning import MotionPlanner
+from paani_services.navigator.avoidance.constraints import HALF_FIELD_OF_VIEW_RAD
 from paani_services.navigator.avoidance.fence import limit_speed
 from paani_services.navigator.avoidance.replanning import (
     COURSE_TOLERANCE_RAD,
@@ -47,6 +49,7 @@ from paani_services.navigator.guidance.station_keeping import (
     take_station,
 )
 from paani_services.navigator.guidance.visual_turns import (
+    ON_HEADING_RAD,
     TURN_DIRECTIONS,
     TURN_SIDE,
     VisualTurn,
@@ -200,8 +203,24 @@ def _keep_station(
     if here is None:
         return state, None
     here_m = (here.x_m, here.y_m)
-    station = take_station(state.station, here_m, now_us, config)
+    turn_rad = _interrupted_turn_rad(state, odometry.yaw_rad, now_us, config)
+    station = msgspec.structs.replace(take_station(state.station, here_m, now_us, config), turn_rad=turn_rad)
     return msgspec.structs.replace(state, station=station), hold_station(station, here_m, odometry)
+
+
+def _interrupted_turn_rad(state: NavigatorState, yaw_rad: float, now_us: int, config: NavigatorConfig) -> float | None:
+    """The heading of the plan that the stop interrupts, if the boat does not see in that direction, until it is on it.
+
+    Its plan is newer than the stop before, and no older than `replan_s`.
+    """
+    planner_state, station = state.planner_state, state.station
+    if station is not None and station.stopped_us >= planner_state.planned_us:
+        turn_rad, seen_rad = station.turn_rad, ON_HEADING_RAD
+    else:
+        plan, seen_rad = planner_state.plan, HALF_FIELD_OF_VIEW_RAD
+        is_in_force = not has_passed(planner_state.planned_us, config.planner.replan_s * 1e6, now_us)
+        turn_rad = plan.heading_rad if plan is not None and plan.speed_mps > 0.0 and is_in_force else None
+    return turn_rad if turn_rad is not None and abs(wrap_rad(turn_rad - yaw_rad)) > seen_rad else None
 
 
 def _advance_mission(

@@ -19,12 +19,17 @@ LOST_M = 1.5  # farther off, the boat has made way; 0.3 m/s of current carry it 
 
 
 class Station(msgspec.Struct, frozen=True):
-    """A place by dead reckoning, in metres with the map's axes; since when and when last the water stopped the boat."""
+    """A place by dead reckoning, in metres with the map's axes; since when and when last the water stopped the boat.
+
+    turn_rad: the heading in the map, out of the picture, to which the boat was turning when it stopped; None once it is
+    on it.
+    """
 
     since_us: int
     stopped_us: int
     x_m: float
     y_m: float
+    turn_rad: float | None = None
 
 
 class StationSetpoint(NamedTuple):
@@ -58,6 +63,9 @@ def take_station(station: Station | None, here_m: tuple[float, float], now_us: i
 def hold_station(station: Station, here_m: tuple[float, float], odometry: Odometry) -> StationSetpoint:
     """The bow turns to where the boat is carried, looks there, and the boat goes back astern to its station.
 
+    A turn that the stop interrupted is finished first, on the spot: the stop is for what the picture shows, and where
+    the boat turns to lies out of it. A boat that turned back instead would never see there.
+
     Fans work along the hull alone: a drift abeam ends only with the bow towards it. Nothing leads the boat ahead. It
     goes astern the slower the more its station lies to a side, and not at all from 45 degrees on: astern it crosses
     nothing but the water over which it has come.
@@ -67,7 +75,9 @@ def hold_station(station: Station, here_m: tuple[float, float], odometry: Odomet
     soon_x_m = off_x_m + LEAD_S * (odometry.surge_mps * cos - odometry.sway_mps * sin)
     soon_y_m = off_y_m + LEAD_S * (odometry.surge_mps * sin + odometry.sway_mps * cos)
     heading_rad = odometry.yaw_rad
-    if math.hypot(soon_x_m, soon_y_m) > AT_STATION_M and not odometry.stopped:
+    if station.turn_rad is not None:
+        heading_rad = station.turn_rad
+    elif math.hypot(soon_x_m, soon_y_m) > AT_STATION_M and not odometry.stopped:
         heading_rad = wrap_rad(portable.atan2(soon_y_m, soon_x_m))
     astern_m, aside_m = off_x_m * cos + off_y_m * sin, abs(off_y_m * cos - off_x_m * sin)
     return StationSetpoint(heading_rad, clip(RETURN_PER_S * (astern_m - aside_m), 0.0, STATION_ASTERN_MPS))
