@@ -106,10 +106,14 @@ def _parser() -> argparse.ArgumentParser:
     train.add_argument(
         "--start",
         type=Path,
-        help="checkpoint, or exported ONNX file, to begin from; for gate: the segmenter whose errors it learns",
+        help="checkpoint, or exported ONNX file, to begin from; for gate: an exported one",
     )
     train.add_argument("--teacher", type=Path, help="segmenter checkpoint that the paper-segmenter learns from")
-    train.add_argument("--labels-from", type=Path, help="segmenter checkpoint that labels unsegmented pictures")
+    train.add_argument(
+        "--labels-from",
+        type=Path,
+        help="segmenter checkpoint that labels unsegmented pictures; for gate: ONNX file whose errors it learns",
+    )
     train.add_argument("--stage", action="append", default=[], metavar="EPOCHSxHEIGHTxWIDTH", help="repeatable")
     train.add_argument("--epochs", type=int, help="detector and gate only")
     train.add_argument("--batch", type=int, help="detector and segmenters: pictures a step; 16 if not given")

@@ -7,9 +7,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import onnx
 import torch
+from onnx import numpy_helper
 from torch import Tensor, nn
 
+from paani.errors import UserError
 from paani_models.segmenter.shipped_network import ShippedSegmenter, load_imagenet_encoder
 
 INPUT_HEIGHT_PX, INPUT_WIDTH_PX = 120, 160
@@ -61,3 +64,18 @@ def start_from_imagenet(network: ImageQualityNetwork, path: Path) -> None:
         layer.load_state_dict(pretrained_layer.state_dict())
     for frozen_layer in list(network.front)[: 1 + FROZEN_STAGES]:
         frozen_layer.requires_grad_(False)
+
+
+def start_from_export(network: ImageQualityNetwork, path: Path) -> None:
+    """Fill the network from its own export, which has no normalisation to fold and so keeps every weight's name.
+
+    Raises UserError where the file is no export of it.
+    """
+    try:
+        stored = onnx.load(str(path)).graph.initializer
+    except Exception as error:
+        raise UserError(f"{path}: not a readable ONNX file ({type(error).__name__})") from error
+    try:
+        network.load_state_dict({each.name: torch.tensor(numpy_helper.to_array(each)) for each in stored})
+    except RuntimeError as error:
+        raise UserError(f"{path}: no export of the image-quality network") from error

@@ -26,7 +26,7 @@ from paani_models.datasets.sources import Sample
 from paani_models.engines.onnx_runner import open_network
 from paani_models.image_quality.data import FaultLevel, Scene, Segment, measure_fault_levels, read_scenes
 from paani_models.image_quality.draws import CLEAN, WITHOUT_WATER, FitnessExample, draw_epoch_plan, draw_example
-from paani_models.image_quality.network import ImageQualityNetwork, start_from_imagenet
+from paani_models.image_quality.network import ImageQualityNetwork, start_from_export, start_from_imagenet
 from paani_models.network_input import segmenter_input
 from paani_models.training.training_state import Prefetch, TrainingState, append_record, learning_rate, to_device
 
@@ -82,11 +82,18 @@ class ImageQualityTraining:
     """One training in a folder: cells.json (the segmenter's error per fault level), checkpoints, log.jsonl."""
 
     def __init__(
-        self, folder: Path, samples: Sequence[Sample], weights: Path, imagenet: Path, recipe: ImageQualityRecipe
+        self,
+        folder: Path,
+        samples: Sequence[Sample],
+        weights: Path,
+        imagenet: Path,
+        recipe: ImageQualityRecipe,
+        start: Path | None = None,
     ) -> None:
         """samples: training side only.
 
-        weights: the segmenter's ONNX file. Raises UserError for a file that does not fit.
+        weights: the segmenter's ONNX file. start: an export of the network to begin from, instead of ImageNet's weights
+        alone. Raises UserError for a file that does not fit.
         """
         folder.mkdir(parents=True, exist_ok=True)
         self.folder = folder
@@ -100,7 +107,11 @@ class ImageQualityTraining:
         net = ImageQualityNetwork()
         start_from_imagenet(net, imagenet)
         self.errors = FaultLevelErrors(len(self.levels))
+        if start is not None:
+            start_from_export(net, start)
         self.state = TrainingState(net, recipe.peak_rate, recipe.weight_decay, self.errors, pretrained=net.front)
+        if start is not None:
+            self.state.average_from_model()
         self._identity = {**asdict(recipe), "segmenter": file_sha256(weights), "pictures": len(self.scenes)}
         self.state.resume(folder, self._identity)
 

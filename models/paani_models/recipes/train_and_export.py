@@ -229,7 +229,7 @@ def _train_yolo11n(pictures: PictureSelection, options: TrainingOptions) -> None
 
 
 def _train_image_quality(pictures: PictureSelection, options: TrainingOptions) -> None:
-    """`options.start`: the segmenter whose errors decide what is fit; the shipped one if not given."""
+    """`options.labels_from`: the segmenter whose errors decide what is fit; the shipped one if not given."""
     recipe = ImageQualityRecipe(checked=not options.unchecked)
     recipe = replace(recipe, epochs=options.epochs or recipe.epochs, peak_rate=options.peak_rate or recipe.peak_rate)
     never = {sample.picture: sample for sample in pictures.training_samples()}
@@ -237,8 +237,9 @@ def _train_image_quality(pictures: PictureSelection, options: TrainingOptions) -
         sample.picture: sample for sample in pictures.segmented_samples(held_out=False) if sample.picture in never
     }
     samples = list({**never, **masked}.values())
-    segmenter = options.start or verified_path("segmenter")
-    ImageQualityTraining(options.folder, samples, segmenter, pictures.data / IMAGENET_FILE, recipe).run()
+    segmenter = options.labels_from or verified_path("segmenter")
+    imagenet = pictures.data / IMAGENET_FILE
+    ImageQualityTraining(options.folder, samples, segmenter, imagenet, recipe, options.start).run()
 
 
 def export_untrained_network(net: str, weights: Path) -> int:

@@ -15,10 +15,15 @@ from paani.errors import UserError  # noqa: E402
 from paani.picture_faults import WATER  # noqa: E402
 from paani_models.catalogue import WEIGHTS  # noqa: E402
 from paani_models.datasets.sources import Sample, Source  # noqa: E402
+from paani_models.engines.onnx_runner import open_network  # noqa: E402
 from paani_models.image_quality import train  # noqa: E402
 from paani_models.image_quality.data import FaultLevel, Scene, choose_validation_sequences, read_scenes  # noqa: E402
 from paani_models.image_quality.draws import CLEAN, WITHOUT_WATER, draw_epoch_plan, draw_example  # noqa: E402
-from paani_models.image_quality.network import ImageQualityNetwork, start_from_imagenet  # noqa: E402
+from paani_models.image_quality.network import (  # noqa: E402
+    ImageQualityNetwork,
+    start_from_export,
+    start_from_imagenet,
+)
 from paani_models.image_quality.train import FaultLevelErrors, ImageQualityTraining, threshold_figures  # noqa: E402
 from paani_models.segmenter.shipped_network import ShippedSegmenter  # noqa: E402
 from paani_models.training.training_state import load_checkpoint  # noqa: E402
@@ -170,6 +175,24 @@ def test_the_convolutional_front_starts_from_imagenet_with_its_first_stages_froz
     learns = [any(p.requires_grad for p in part.parameters()) for part in net.front]
     assert learns == [False, False, False, True, True]
     assert net(torch.zeros(1, 3, 120, 160)).shape == (1, 1)
+
+
+def test_a_training_begins_with_the_weights_of_an_export(
+    tmp_path: Path, imagenet: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(train, "read_scenes", lambda *_: [shore()])
+    monkeypatch.setattr(train, "measure_fault_levels", lambda *_: LEVELS)
+    begun = ImageQualityTraining(
+        tmp_path, [], WEIGHTS / "segmenter.onnx", imagenet, train.ImageQualityRecipe(), start=WEIGHTS / "gate.onnx"
+    ).state
+    x = np.random.default_rng(3).random((2, 3, 120, 160), dtype=np.float32)
+    expected = open_network(WEIGHTS / "gate.onnx", 1)(x[:1])
+    for net in (begun.model, begun.average.model):
+        assert np.allclose(net.eval()(torch.from_numpy(x[:1])).detach().numpy(), expected, atol=1e-4)
+    assert begun.average.updates > 0  # as of a finished training: one step hardly moves it
+    for file, wrong in ((WEIGHTS / "segmenter.onnx", "no export of"), (imagenet, "not a readable ONNX file")):
+        with pytest.raises(UserError, match=wrong):
+            start_from_export(ImageQualityNetwork(), file)
 
 
 def test_unchecked_training_also_uses_the_validation_sequences(
