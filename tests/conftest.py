@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import functools
+import itertools
 import os
 import signal
 import socket
@@ -52,6 +53,7 @@ settings.register_profile("quick", max_examples=15, deadline=None)  # for `make 
 settings.register_profile("thorough", deadline=None)  # a busy machine fails no test
 settings.load_profile("thorough")
 
+FIRST_PORT, PORTS_OF_A_WORKER, PORT_WORKERS = 20_000, 4_000, 3
 START_TIMEOUT_S = 40.0
 STOP_TIMEOUT_S = 10.0
 
@@ -185,9 +187,24 @@ def free_port() -> int:
 
 
 def find_free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
+    """A port that is free, and given to nobody else before long: not to another worker, nor by the system.
+
+    A test's processes open it seconds later, and two routers at one port would be one bus.
+    """
+    for port in _ports():
+        with socket.socket() as probe, contextlib.suppress(OSError):
+            probe.bind(("127.0.0.1", port))
+            return port
+    raise AssertionError("no port is free")
+
+
+@functools.cache
+def _ports() -> Iterator[int]:
+    """The ports of this worker, one after the other from anywhere; all lie below those that Linux gives by itself."""
+    number = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw")) % PORT_WORKERS
+    first = FIRST_PORT + number * PORTS_OF_A_WORKER
+    begin = os.getpid() % PORTS_OF_A_WORKER
+    return itertools.cycle(first + (begin + step) % PORTS_OF_A_WORKER for step in range(PORTS_OF_A_WORKER))
 
 
 @pytest.fixture
