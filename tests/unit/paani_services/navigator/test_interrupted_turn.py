@@ -1,4 +1,4 @@
-"""A turn that a stop interrupts is finished on the spot, which leads out of the picture that stopped the boat."""
+"""A turn out of the picture goes on, on the spot, where that picture stops the boat."""
 
 import math
 
@@ -22,7 +22,7 @@ from tests.unit.paani_services.navigator.test_navigate import NOW_US, RUNNING, a
 NAVIGATOR = load_config().navigator
 STEP_US = 100_000
 REPLAN_US = round(NAVIGATOR.planner.replan_s * 1e6)
-TURN_RADPS = 0.35
+TURN_RADPS, DRIFT_MPS = 0.35, 0.1
 ANGLE = st.floats(-math.pi, math.pi)
 
 
@@ -32,12 +32,11 @@ class Drive:
     def __init__(self, plan: HeadingSpeed) -> None:
         self.plan, self.state, self.now_us = plan, RUNNING, NOW_US
 
-    def order(self, direction: Direction, at: Odometry, after_us: int = STEP_US, reason: Reason = Reason.NO_SAFE_SIDE,
-              may: bool = True) -> NavCommand:  # fmt: skip
+    def order(self, direction: Direction, at: Odometry, after_us: int = STEP_US, *, may: bool = True) -> NavCommand:
         self.now_us += after_us
         advisory = advice(direction, self.now_us)
         if direction is Direction.STOP:
-            advisory = msgspec.structs.replace(advisory, reason=reason, may_keep_station=may)
+            advisory = msgspec.structs.replace(advisory, reason=Reason.NO_SAFE_SIDE, may_keep_station=may)
         given_inputs = inputs(
             self.now_us, advisory=advisory, odometry=msgspec.structs.replace(at, source_us=self.now_us)
         )
@@ -47,11 +46,10 @@ class Drive:
         return order
 
 
-def adrift(yaw_rad: float, towards_rad: float = 0.0, speed_mps: float = 0.1) -> Odometry:
-    """A boat with its bow there that is carried in a direction of the map."""
-    off_rad = towards_rad - yaw_rad
+def adrift(yaw_rad: float) -> Odometry:
+    """A boat with its bow there that is carried along the map's first axis."""
     return msgspec.structs.replace(
-        pose(3.0, 0.0, yaw_rad), surge_mps=speed_mps * math.cos(off_rad), sway_mps=speed_mps * math.sin(off_rad)
+        pose(3.0, 0.0, yaw_rad), surge_mps=DRIFT_MPS * math.cos(yaw_rad), sway_mps=-DRIFT_MPS * math.sin(yaw_rad)
     )
 
 
