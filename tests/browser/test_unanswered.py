@@ -21,12 +21,13 @@ pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
 class Silence:
     """Requests that are kept without an answer, as on a link that is dead, for as long as it lasts.
 
-    `most_waiting` is how many of them waited at a time, as the page gives each up after a while; a stick that is let go
-    is said at any time, and not counted.
+    `most_waiting` is how many of them waited at a time, as the page gives each up after a while; a stick that was just
+    let go is said at any time, and not counted.
     """
 
     def __init__(self, page: Any, most: int | None = None) -> None:
         self.kept, self.most_waiting, self._most = 0, 0, most
+        self._drives = False
         self._waiting: set[Any] = set()
         page.on("requestfailed", lambda request: self._waiting.discard(request))
 
@@ -36,7 +37,8 @@ class Silence:
             return
         self.kept += 1
         body = route.request.post_data_json or {}
-        if any(body.get(axis) != 0 for axis in ("surge", "turn")):
+        drove, self._drives = self._drives, any(body.get(axis, 0) != 0 for axis in ("surge", "turn"))
+        if self._drives or not drove:
             self._waiting.add(route.request)
         self.most_waiting = max(self.most_waiting, len(self._waiting))
 
@@ -77,6 +79,20 @@ async def test_a_hand_drives_again_after_a_link_that_swallowed_what_it_said(
         await page.keyboard.down("w")
         await orders.until(lambda found: found.stick == (1.0, 0.0))
         await page.keyboard.up("w")
+
+
+async def test_a_stick_at_rest_leaves_room_for_a_stop_on_a_link_that_is_dead(
+    browser: Any, boat: Boat, open_as: OpenAs, spawn: Spawn, config: Config
+) -> None:
+    orders = Orders((await open_as("observer")).latest(keys.OPERATOR_ORDER))
+    async with spawn("operator"), spawn("dashboard"):
+        page = (await watch(browser, config)).page
+        await arm_on_page(f"http://127.0.0.1:{config.dashboard.port}", config.bus)
+        await drive_manually(page, orders)
+        dead = Silence(page)
+        await page.route("**/api/drive/setpoint", dead)
+        await until(page, "document.querySelector('#drive-note').textContent === 'no answer from the dashboard'")
+        assert dead.most_waiting == 3
 
 
 async def test_holds_without_an_answer_leave_room_for_a_stop(

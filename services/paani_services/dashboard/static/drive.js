@@ -18,6 +18,8 @@ const KEYS = {
   KeyA: [0, 1], ArrowLeft: [0, 1], KeyD: [0, -1], ArrowRight: [0, -1],
 };
 let number = Date.now(), underWay = 0, refusal = "", canDrive = false;
+/** Whether what was said last drives nowhere. */
+let isNeutral = true;
 /** Keys that are held. @type {Set<string>} */
 const held = new Set();
 /** Where the stick is held: ahead and to port, each in [-1, 1]; null while it is not. @type {[number, number] | null} */
@@ -47,11 +49,12 @@ function wanted() {
   return [Math.max(-1, Math.min(1, sum(0))), Math.max(-1, Math.min(1, sum(1)))];
 }
 
-/** @param {boolean} [isLast] */
+/** What the hand asks for now; a stick that was just let go is said at once, whatever is under way. @param {boolean} [isLast] */
 async function say(isLast = false) {
   const [surge, turn] = wanted();
-  const isNeutral = surge === 0 && turn === 0;
-  if (!canDrive || (underWay >= MAX_UNDER_WAY && !isNeutral)) return;
+  const isLetGo = !isNeutral && surge === 0 && turn === 0;
+  if (!canDrive || (underWay >= MAX_UNDER_WAY && !isLetGo)) return;
+  isNeutral = surge === 0 && turn === 0;
   underWay++;
   number = Math.max(number + 1, Date.now());
   const refused = await post("/api/drive/setpoint", { hand, number, surge, turn }, isLast, SETPOINT_MS);
