@@ -131,7 +131,7 @@ def _parser() -> argparse.ArgumentParser:
     train.add_argument("--draws", type=float, default=1.0, metavar="SHARE", help="detector: of an epoch's pictures")
     train.add_argument("--size", metavar="HEIGHTxWIDTH", help="detector: of its input; 320x416 if not given")
     train.add_argument("--unchecked", action="store_true", help="gate: also on the sequences that choose its threshold")
-    train.add_argument("--seed", type=int, metavar="N", help="detector and segmenters; 42 if not given")
+    train.add_argument("--seed", type=int, metavar="N", help="detector, segmenters and gate; 42 if not given")
     train.add_argument(
         "--without",
         action="append",

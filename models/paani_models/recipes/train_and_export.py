@@ -118,6 +118,17 @@ def segmenter_recipe(net: str, options: TrainingOptions) -> SegmenterRecipe:
     )
 
 
+def image_quality_recipe(options: TrainingOptions) -> ImageQualityRecipe:
+    """What decides a training of the image-quality network."""
+    recipe = ImageQualityRecipe(checked=not options.unchecked)
+    return replace(
+        recipe,
+        epochs=options.epochs or recipe.epochs,
+        peak_rate=options.peak_rate or recipe.peak_rate,
+        seed=recipe.seed if options.seed is None else options.seed,
+    )
+
+
 def detector_recipe(options: TrainingOptions) -> DetectorRecipe:
     """What decides a training of the detector. Raises UserError naming an option that is malformed."""
     height_px, width_px = parse_size(options.size) if options.size else DETECTOR_SIZE_WH[::-1]
@@ -230,8 +241,7 @@ def _train_yolo11n(pictures: PictureSelection, options: TrainingOptions) -> None
 
 def _train_image_quality(pictures: PictureSelection, options: TrainingOptions) -> None:
     """`options.labels_from`: the segmenter whose errors decide what is fit; the shipped one if not given."""
-    recipe = ImageQualityRecipe(checked=not options.unchecked)
-    recipe = replace(recipe, epochs=options.epochs or recipe.epochs, peak_rate=options.peak_rate or recipe.peak_rate)
+    recipe = image_quality_recipe(options)
     never = {sample.picture: sample for sample in pictures.training_samples()}
     masked = {
         sample.picture: sample for sample in pictures.segmented_samples(held_out=False) if sample.picture in never

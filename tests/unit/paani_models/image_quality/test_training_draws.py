@@ -25,6 +25,7 @@ from paani_models.image_quality.network import (  # noqa: E402
     start_from_imagenet,
 )
 from paani_models.image_quality.train import FaultLevelErrors, ImageQualityTraining, threshold_figures  # noqa: E402
+from paani_models.recipes.train_and_export import TrainingOptions, image_quality_recipe  # noqa: E402
 from paani_models.segmenter.shipped_network import ShippedSegmenter  # noqa: E402
 from paani_models.training.training_state import load_checkpoint  # noqa: E402
 from tests.pictures import river  # noqa: E402
@@ -208,6 +209,12 @@ def test_unchecked_training_also_uses_the_validation_sequences(
     assert (len(training.scenes), training.validation) == (3, [])
     training.run()
     assert set(json.loads((tmp_path / "run" / "log.jsonl").read_text())) == {"epoch", "loss"}
+
+
+def test_seed_epochs_and_rate_are_those_asked_for(tmp_path: Path) -> None:
+    given = image_quality_recipe(TrainingOptions(tmp_path, seed=7, epochs=3, peak_rate=1e-4, unchecked=True))
+    assert given == train.ImageQualityRecipe(epochs=3, peak_rate=1e-4, seed=7, checked=False)
+    assert image_quality_recipe(TrainingOptions(tmp_path)) == train.ImageQualityRecipe()
 
 
 def test_a_resumed_run_equals_an_unbroken_one_s11(
