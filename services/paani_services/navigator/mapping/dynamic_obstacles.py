@@ -15,7 +15,14 @@ import numpy as np
 from paani.arrays import F64
 from paani.config import PlannerConfig
 from paani.messages import Label
-from paani_services.navigator.mapping.observation import BOX_STEPS, MAX_OBSERVATIONS, OUTLINE_POINTS, Observation
+from paani_services.navigator.mapping.observation import (
+    BOX_STEPS,
+    MASK_ROW_FRAC,
+    MAX_OBSERVATIONS,
+    OUTLINE_POINTS,
+    Observation,
+    ObstacleBox,
+)
 from paani_services.navigator.mapping.observed_cells import CELL_M, Camera, own_hull_top
 from paani_services.navigator.mapping.occupancy_grid import (
     GRID_CELLS,
@@ -40,8 +47,11 @@ from paani_services.navigator.mapping.velocity_fit import (
 )
 
 BOX_EDGE_DEVIATION = 1.0 / 240.0  # standard deviation of a box's lower end, of the picture's height
-# The waterline of a hull, where the mask ends the water, is that much less exact: half a row of 64, which persists
-# until the hull has moved to the next row.
+# Of its height, by which a box ends too low or too high in some pictures. A track has to go on over these; what they
+# make of a velocity shows in its residuals.
+BOX_OUTLIER_FRAC = 0.05
+# The waterline of a hull aslant, where the mask ends the water, is that much less exact: half a row of 64, which
+# persists until the hull has moved to the next row.
 HULL_EDGE_FACTOR = 2.0
 POSITION_DEVIATION_M = 0.05  # all other errors of a position near the camera
 CROSS_RANGE_FACTOR = 2.3  # and across the ray, in units of the angle of BOX_EDGE_DEVIATION
@@ -51,6 +61,7 @@ MAX_DRIFT_MPS = 0.3  # vessels adrift are slower than this
 MIN_DRIFT_DEVIATION_MPS = 0.05  # measured; a hull shows other parts of itself as it is passed
 MIN_UNSEEN_S = 1.0  # five pictures
 GATE_M, GATE_MPS = 0.5, 1.2  # validation gate between two measurements: an obstacle's size, and its highest speed
+OTHER_LABEL_M = 0.5  # by which what is labelled otherwise counts as further away: the size of an obstacle
 CACHED_PAIRS = 4 * MAX_OBSERVATIONS  # of pictures: a track goes on in the next picture, or a few later
 BORDER_STEPS = 4  # a box that comes this near to the picture's sides [1/512] may go on beyond
 
@@ -110,11 +121,12 @@ def find_dynamic_obstacles(
     for track in _associate_measurements(observations, now_us, camera, config):
         complete = _latest_whole(track, max(config.fit_s, DRIFT_FIT_S))
         velocity, last = estimate_velocity(complete, config.fit_s), complete[-1] if complete else track[-1]
-        if velocity is None and track[-1].label is Label.VESSEL:
+        label = _commonest_label(track)
+        if velocity is None and label is Label.VESSEL:
             velocity, last = _estimate_drift(track, complete), track[-1]
         if velocity is None:
             age_s = (now_us - track[-1].stamp_us) * 1e-6
-            if track[-1].label is Label.PERSON and len(track) > 1 and age_s <= config.occupied_s:
+            if label is Label.PERSON and len(track) > 1 and age_s <= config.occupied_s:
                 found.append(_possible_swimmer(track, age_s, config))
             continue
         age_s, left = (now_us - last.stamp_us) * 1e-6, track[: first_since(track, round(config.free_s * 1e6))]
@@ -122,12 +134,12 @@ def find_dynamic_obstacles(
             DynamicObstacle(
                 last.outline[0] + age_s * velocity.east_mps,
                 last.outline[1] + age_s * velocity.north_mps,
-                config.person_near_m if last.label is Label.PERSON else config.vessel_near_m,
+                config.person_near_m if label is Label.PERSON else config.vessel_near_m,
                 velocity,
                 age_s,
                 frozenset(each.box_id for each in left),
                 _latest_track_id(track),
-                last.label,
+                label,
             )
         )
     return tuple(found)
@@ -195,6 +207,12 @@ def _possible_swimmer(track: list[PositionMeasurement], age_s: float, config: Pl
     )
 
 
+def _commonest_label(track: list[PositionMeasurement]) -> Label:
+    """What most pictures show it as; of two as common, what the newest shows it as."""
+    labels = [each.label for each in reversed(track)]
+    return max(labels, key=labels.count)
+
+
 def _latest_track_id(track: list[PositionMeasurement]) -> int:
     """The advisor's track of the newest measurement that has one; the association here does not depend on it."""
     return next((each.track_id for each in reversed(track) if each.track_id), 0)
@@ -219,7 +237,8 @@ def _associate_measurements(
     """The measurements of each obstacle, oldest first.
 
     Association is greedy nearest neighbour within a validation gate (Bar-Shalom, Li, Kirubarajan: "Estimation with
-    Applications to Tracking and Navigation", 2001), among obstacles of one label.
+    Applications to Tracking and Navigation", 2001). The detector takes one hull for a vessel in this picture and for a
+    buoy in the next, so another label counts as `OTHER_LABEL_M` further away; but no person is taken for a thing.
     """
     tracks: list[list[PositionMeasurement]] = []
     recent: dict[MeasuredPicture, dict[int, int]] = {}  # by picture: the track that each of its measurements ends
@@ -270,14 +289,19 @@ def _find_matches(before: MeasuredPicture, after: MeasuredPicture) -> Sequence[S
     within_m = GATE_M + GATE_MPS * ((after.stamp_us - before.stamp_us) * 1e-6)
     return [
         [
-            (distance_m, f)
+            (distance_m + OTHER_LABEL_M * (each.label is not last.label), f)
             for f, each in enumerate(after.measurements)
-            if each.label is last.label
+            if _may_be_one(each.label, last.label)
             and (distance_m := math.dist(last.position_m, each.position_m))
-            <= within_m + last.range_deviation_m + each.range_deviation_m
+            <= within_m + last.gate_deviation_m + each.gate_deviation_m
         ]
         for last in before.measurements
     ]
+
+
+def _may_be_one(label: Label, other: Label) -> bool:
+    """Whether the detector may label one and the same obstacle so."""
+    return label is other or Label.PERSON not in (label, other)
 
 
 @functools.lru_cache(maxsize=MAX_OBSERVATIONS)
@@ -289,7 +313,8 @@ def _measure_positions(observation: Observation, camera: Camera, max_range_m: fl
     camera_model = pinhole_at(observation.pose, camera.calibration, observation.aspect_ratio)
     left, right = np.array([(box.left, box.right) for box in observation.boxes]).T[:, :, None]
     u = (left + (right - left) * ((np.arange(OUTLINE_POINTS) + 0.5) / OUTLINE_POINTS)) / BOX_STEPS
-    v = np.array([box.waterline for box in observation.boxes]) / BOX_STEPS
+    v = np.array([(box.bottom,) * OUTLINE_POINTS if _is_level(box) else box.waterline for box in observation.boxes])
+    v = v / BOX_STEPS
     rays = pixel_rays(camera_model, u, np.minimum(v, own_hull_top(camera.ego_polygon, u)))
     range_m = ranges_to_water_m(camera_model, rays, max_range_m)
     east_m: F64 = camera_model.position_m[0] + range_m * rays.east
@@ -316,8 +341,10 @@ def _measure_position(
     position_m = (sum(easts) / OUTLINE_POINTS, sum(norths) / OUTLINE_POINTS)
     distance_m = max(math.dist(position_m, camera_m), POSITION_DEVIATION_M)
     width_deviation_m = WIDTH_DEVIATION_FRAC * math.dist((easts[0], norths[0]), (easts[-1], norths[-1]))
-    edge_rad = row_rad if box.is_small else HULL_EDGE_FACTOR * row_rad
+    edge_rad = row_rad if _is_level(box) else HULL_EDGE_FACTOR * row_rad
+    outlier_rad = BOX_OUTLIER_FRAC * (box.bottom - box.top) / BOX_STEPS / camera_model.focal[1]
     range_deviation_m = POSITION_DEVIATION_M + width_deviation_m + edge_rad * distance_m * distance_m / height_m
+    gate_deviation_m = range_deviation_m + outlier_rad * distance_m * distance_m / height_m
     cross_range_deviation_m = POSITION_DEVIATION_M + width_deviation_m + CROSS_RANGE_FACTOR * row_rad * distance_m
     east, north = (position_m[0] - camera_m[0]) / distance_m, (position_m[1] - camera_m[1]) / distance_m
     range_information, cross_range_information = (
@@ -329,8 +356,21 @@ def _measure_position(
         (range_information - cross_range_information) * east * north,
         range_information * north * north + cross_range_information * east * east,
     )
-    foot = box.bottom < BOX_STEPS - BORDER_STEPS
-    shows_ends = (foot and box.left > BORDER_STEPS, foot and box.right < BOX_STEPS - BORDER_STEPS)
     return PositionMeasurement(
-        box_id, box.label, position_m, information_matrix, range_deviation_m, outline, shows_ends, track_id
+        box_id, box.label, position_m, information_matrix, gate_deviation_m, outline, _shown_ends(box), track_id
     )
+
+
+def _shown_ends(box: ObstacleBox) -> tuple[bool, bool]:
+    """Whether the picture shows the left and the right end of what is in the box."""
+    foot = box.bottom < BOX_STEPS - BORDER_STEPS
+    return foot and box.left > BORDER_STEPS, foot and box.right < BOX_STEPS - BORDER_STEPS
+
+
+def _is_level(box: ObstacleBox) -> bool:
+    """Whether it stands on its lower end all along: a small thing, or a whole hull end on or abeam.
+
+    Of such a hull the mask ends the water within a row of the box's lower end, which is more exact.
+    """
+    is_near_end = min(box.waterline) >= box.bottom - MASK_ROW_FRAC * BOX_STEPS
+    return box.is_small or (is_near_end and all(_shown_ends(box)))

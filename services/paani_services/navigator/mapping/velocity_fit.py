@@ -11,10 +11,10 @@ from paani.messages import Label
 
 MIN_SIGNIFICANCE = 4.0  # standard deviations between rest and a velocity that is not chance
 MIN_SPEED_MPS = 0.08  # slower obstacles are static: the drift of Q6 covers them
-MIN_MEASUREMENTS, MIN_SPAN_S = 3, 0.7  # fewer measurements, or over a shorter time, give no velocity
+MIN_MEASUREMENTS, MIN_SPAN_S = 4, 0.7  # fewer, or over a shorter time, give no velocity: three lie on a line by chance
 INDEPENDENT_RATE_HZ = 5.0  # measurements that follow faster have the same errors
 PRIOR_DEGREES_OF_FREEDOM = 5.0  # of the reduced chi-squared
-PRIOR_SPEED_DEVIATION_MPS = 0.7  # standard deviation of the velocity of obstacles, without any measurement
+PRIOR_SPEED_DEVIATION_MPS = 1.5  # of what moves: barges go up to 2.2 m/s, rowing eights to 3.2
 
 SymmetricMatrix = tuple[float, float, float]  # a 2 x 2 matrix: east-east, east-north, north-north
 PlaneVector = tuple[float, float]
@@ -23,7 +23,7 @@ PlaneVector = tuple[float, float]
 class PositionMeasurement(NamedTuple):
     """The position of an obstacle in one picture, east and north [m], with the inverse of its covariance.
 
-    box_id: as in `BoxIds`. range_deviation_m: standard deviation of its range.
+    box_id: as in `BoxIds`. gate_deviation_m: by which its range may be wrong in a picture whose box is.
     outline: points where it meets the water, from left to right.
     shows_ends: whether the picture shows its left and its right end. track_id: the advisor's track of it; 0: unknown.
     """
@@ -32,7 +32,7 @@ class PositionMeasurement(NamedTuple):
     label: Label
     position_m: PlaneVector
     information_matrix: SymmetricMatrix
-    range_deviation_m: float
+    gate_deviation_m: float
     outline: tuple[F64, F64]
     shows_ends: tuple[bool, bool]
     track_id: int = 0

@@ -278,3 +278,75 @@ def test_a_track_goes_on_with_its_own_label_within_the_time_that_is_fitted(
         box = detection_of((4.9, -0.2, 5.1, 0.1), 0.4, label)
         memory = observe_from(at_us=at_us, memory=memory, detections=(box,))
     assert len(find_dynamic_obstacles(memory.observations, at_us, CAMERA, PLANNER)) == count
+
+
+@settings(max_examples=25)
+@given(labels=st.lists(st.sampled_from([Label.VESSEL, Label.BUOY]), min_size=12, max_size=12))
+def test_what_comes_is_known_by_its_motion_whatever_each_picture_takes_it_for(labels: list[Label]) -> None:
+    """A hull that comes at 1.5 m/s from 10 m off, in pictures 0.2 s apart, is met as one that moves."""
+    memory, at_us = ObservationMemory(), START_US
+    for number, label in enumerate(labels):
+        at_us, ahead_m = START_US + 200_000 * number, 10.0 - 0.3 * number
+        box = detection_of((ahead_m, -0.6, ahead_m + 0.4, 0.6), 1.5, label)
+        edge = water_edge_of(AT_REST, ((ahead_m, -0.6, ahead_m + 4.0, 0.6),))
+        memory = observe_from(edge=edge, at_us=at_us, memory=memory, detections=(box,))
+    (found,) = find_dynamic_obstacles(memory.observations, at_us, CAMERA, PLANNER)
+    assert found.velocity.east_mps == pytest.approx(-1.5, abs=0.4)
+    assert found.label is max(reversed(labels), key=labels.count)
+
+
+@pytest.mark.parametrize("speed_mps", [2.2, 3.0])
+def test_a_long_hull_that_comes_end_on_is_known_within_two_seconds(speed_mps: float) -> None:
+    """A barge from 13 m off, an eight: a row of the mask is 2 m there, the lower end of a box half a metre."""
+    memory, at_us = ObservationMemory(), START_US
+    for number in range(10):
+        at_us, ahead_m = START_US + 200_000 * number, 13.0 - 0.2 * speed_mps * number
+        bow, hull = (ahead_m, -1.2, ahead_m + 0.4, 1.2), (ahead_m, -1.2, ahead_m + 10.0, 1.2)
+        memory = observe_from(
+            edge=water_edge_of(AT_REST, (hull,)),
+            at_us=at_us,
+            memory=memory,
+            detections=(detection_of(bow, 1.8, Label.VESSEL),),
+        )
+    (found,) = find_dynamic_obstacles(memory.observations, at_us, CAMERA, PLANNER)
+    assert found.velocity.east_mps == pytest.approx(-speed_mps, abs=0.35)
+
+
+@pytest.mark.parametrize(("pictures", "count"), [(3, 0), (4, 1)])
+def test_three_pictures_are_too_few_for_a_velocity(pictures: int, count: int) -> None:
+    """Three places that a detector is wrong about lie on a line by chance, and what is there would be taken to go."""
+    memory, at_us = ObservationMemory(), START_US
+    for number in range(pictures):
+        at_us, ahead_m = START_US + 400_000 * number, 4.5 - 0.7 * number
+        box = detection_of((ahead_m, -0.2, ahead_m + 0.4, 0.2), 0.5, Label.BUOY)
+        memory = observe_from(at_us=at_us, memory=memory, detections=(box,))
+    assert len(find_dynamic_obstacles(memory.observations, at_us, CAMERA, PLANNER)) == count
+
+
+def test_a_track_goes_on_over_a_box_that_ends_too_low() -> None:
+    """One picture's box of a hull that comes is a tenth longer downwards, which is 2 m nearer."""
+    memory, at_us = ObservationMemory(), START_US
+    for number in range(10):
+        at_us, ahead_m = START_US + 200_000 * number, 12.0 - 0.3 * number
+        box = detection_of((ahead_m, -1.2, ahead_m + 0.4, 1.2), 1.8, Label.BUOY)
+        if number == 6:
+            x1, y1, x2, y2 = box.box_xyxy
+            box = msgspec.structs.replace(box, box_xyxy=(x1, y1, x2, y2 + 0.1 * (y2 - y1)))
+        memory = observe_from(at_us=at_us, memory=memory, detections=(box,))
+    (found,) = find_dynamic_obstacles(memory.observations, at_us, CAMERA, PLANNER)
+    assert found.velocity.east_mps == pytest.approx(-1.5, abs=2.0 * found.velocity.deviation_mps)
+
+
+def test_a_vessel_and_a_buoy_beside_each_other_are_told_apart() -> None:
+    """Each goes on with its own label, although the other is by then where it was."""
+    memory, at_us = ObservationMemory(), START_US
+    for number in range(10):
+        at_us, left_m = START_US + 200_000 * number, 1.0 - 0.2 * number
+        boxes = [
+            detection_of((5.0, at_m - 0.1, 5.2, at_m + 0.1), 0.4, label)
+            for label, at_m in ((Label.VESSEL, left_m), (Label.BUOY, left_m - 0.2))
+        ]
+        memory = observe_from(at_us=at_us, memory=memory, detections=boxes)
+    found = find_dynamic_obstacles(memory.observations, at_us, CAMERA, PLANNER)
+    assert {each.label: round(each.velocity.north_mps, 1) for each in found} == {Label.VESSEL: -1.0, Label.BUOY: -1.0}
+    assert all(each.velocity.deviation_mps < 0.05 for each in found)  # one that was taken for the other leaps
