@@ -227,7 +227,7 @@ def test_a_boat_before_a_wall_turns_along_it() -> None:
 
 def test_a_boat_waits_in_a_dead_end_until_it_opens() -> None:
     pool = Pool((4.0, -30.0, 5.0, 30.0))
-    last = pool.settle(45.0)  # it sails along the bar first, slowly
+    last = pool.settle(50.0)  # it sails along the bar first, slowly
     assert last.inhibits == (Inhibit.NO_FREE_PATH,)
     assert pool.gap_m() > 0.6
     pool.bars = ()

@@ -31,6 +31,9 @@ MARGIN_INTRUSION_WEIGHT = 10.0  # a metre of intrusion into the safety margin, h
 UNKNOWN_WATER_WEIGHT = 0.3  # a path all over unknown water: the boat turns to what it sees, and sees further from there
 LOST_PROGRESS_WEIGHT = 0.3  # nothing made good along the desired course
 HEADING_CHANGE_WEIGHT = 0.15  # a quarter turn off the heading of the plan before
+# Of a candidate's other costs, a quarter turn off that heading: from picture to picture the costs of one heading change
+# by less, with what is seen and how far off it is taken to be.
+HEADING_CHANGE_FRAC = 0.1
 ADVICE_WEIGHT = 0.15  # nothing turned to the advised side (M5); it falls linearly to none at ADVISED_TURN_RAD
 ADVISED_TURN_RAD = math.radians(25.0)
 # A vessel on a collision course; it falls linearly to none at WANTED_CPA_M. With 2, turning further away is cheaper
@@ -80,10 +83,10 @@ def weigh_candidates(evaluation: CandidateEvaluation, margin_m: F64) -> Candidat
     path_obstacle = np.clip(1.0 - first_m / config.look_m, 0.0, 1.0) if config.look_m > 0.0 else np.zeros_like(first_m)
     intrusion_m = np.maximum(config.hull_radius_m + config.margin_m - evaluation.clearance_m, 0.0)
     mean_intrusion_m = np.add.accumulate(np.where(is_in_horizon, intrusion_m, 0.0))[-1] / float(is_in_horizon.sum())
-    return CandidateCosts(
+    costs = CandidateCosts(
         course=deviation_rad / QUARTER_TURN_RAD,
         progress=LOST_PROGRESS_WEIGHT * (1.0 - made_good),
-        heading_change=HEADING_CHANGE_WEIGHT * change_rad / QUARTER_TURN_RAD,
+        heading_change=np.zeros_like(deviation_rad),
         advice=ADVICE_WEIGHT * abs(request.setpoint.advised_side) * disregard,
         unknown_water=UNKNOWN_WATER_WEIGHT * (evaluation.is_unknown & is_looked_at).sum(axis=0) / len(is_looked_at),
         proximity=PROXIMITY_WEIGHT * nearness * nearness,
@@ -92,6 +95,8 @@ def weigh_candidates(evaluation: CandidateEvaluation, margin_m: F64) -> Candidat
         give_way=np.zeros_like(deviation_rad),
         passing_side=np.zeros_like(deviation_rad),
     )
+    weight = HEADING_CHANGE_WEIGHT + HEADING_CHANGE_FRAC * costs.total
+    return costs._replace(heading_change=weight * change_rad / QUARTER_TURN_RAD)
 
 
 def add_courtesy(costs: CandidateCosts, evaluation: CandidateEvaluation, is_refused: Bools) -> CandidateCosts:

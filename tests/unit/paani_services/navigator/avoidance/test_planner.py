@@ -72,6 +72,14 @@ def round_about(occupied: np.ndarray) -> OccupancyGrid:
     )
 
 
+def bar_on_grid(bar: Bar) -> np.ndarray:
+    """The cells of a grid around the origin that a bar covers."""
+    west, south, east, north = (round((edge_m + 10.0) / CELL_M) for edge_m in bar)
+    occupied = np.zeros((GRID_CELLS, GRID_CELLS), np.bool_)
+    occupied[south:north, west:east] = True
+    return occupied
+
+
 def clearance_along_m(grid: OccupancyGrid, start: BoatState, found: Plan) -> np.ndarray:
     """Static clearance along the plan within the horizon; negative inside an obstacle."""
     trajectories = planned_trajectory(start, found)
@@ -284,6 +292,19 @@ def test_the_side_of_the_previous_plan_is_kept() -> None:
         assert found.heading_rad * before > 0.0
 
 
+@pytest.mark.parametrize(("half_m", "ahead_m"), [(0.4, 1.2), (0.4, 1.6), (0.6, 1.2)])
+def test_a_side_is_kept_while_the_obstacle_seems_to_shift_by_a_cell(half_m: float, ahead_m: float) -> None:
+    """A boat that pivots back with every picture goes neither way."""
+    plan, sides = None, set()
+    for number in range(6):
+        shift_m = CELL_M * (number % 2)
+        grid = round_about(bar_on_grid((ahead_m, shift_m - half_m, ahead_m + 0.6, shift_m + half_m)))
+        plan = plan_on(grid, RESTING, AHEAD, plan, PLANNER)
+        assert plan.speed_mps > 0.0
+        sides.add(plan.heading_rad > 0.0)
+    assert len(sides) == 1
+
+
 def test_no_cell_within_the_stopping_distance_may_be_unknown() -> None:
     """A boat that needs longer to stop goes slower, or stops: it never outruns what was seen free."""
     near = msgspec.structs.replace(PLANNER, max_range_m=2.6)
@@ -321,9 +342,7 @@ def test_an_obstacle_that_left_the_picture_below_is_remembered() -> None:
 @pytest.mark.parametrize("course", [0.0, 0.8, -0.8, 2.0])
 def test_a_boat_inside_an_obstacle_goes_no_deeper(course: float) -> None:
     """Full ahead through the cells that occupy the boat is no escape, though no cell on the way is further inside."""
-    cells = np.zeros((GRID_CELLS, GRID_CELLS), np.bool_)
-    cells[40:60, 49:62] = True  # the boat is 0.2 m inside the western side
-    grid = round_about(cells)
+    grid = round_about(bar_on_grid((-0.2, -2.0, 2.4, 2.0)))  # the boat is 0.2 m inside the western side
     found = plan_on(grid, RESTING, GuidanceSetpoint(course, 0.6), None, PLANNER)
     if found.speed_mps > 0.0:
         assert clearance_along_m(grid, RESTING, found).min() >= -0.1 - 0.5 * CELL_M - ESCAPE_TOLERANCE_M
@@ -367,9 +386,8 @@ def test_near_an_obstacle_no_candidate_is_feasible_at_full_speed(surge: float) -
     """Beside a wall 0.5 m off, less than hull and Q6's margin, it goes at half the speed; 2 m off at the whole."""
     speeds = []
     for wall_m in (0.4, 2.0):
-        cells = np.zeros((GRID_CELLS, GRID_CELLS), np.bool_)
-        cells[50 + round(wall_m / CELL_M) : 60, :] = True
-        speeds.append(plan_on(round_about(cells), BoatState(0.0, 0.0, 0.0, surge), AHEAD, None, PLANNER).speed_mps)
+        grid = round_about(bar_on_grid((-10.0, wall_m, 10.0, 2.0 + wall_m)))
+        speeds.append(plan_on(grid, BoatState(0.0, 0.0, 0.0, surge), AHEAD, None, PLANNER).speed_mps)
     assert speeds == [0.3, 0.6]
 
 

@@ -97,7 +97,8 @@ def test_in_open_water_the_course_costs_nothing_and_others_by_name() -> None:
         "give_way": 0.0, "passing_side": 0.0,
     }  # fmt: skip
     assert port.costs.course == starboard.costs.course == pytest.approx(10.0 / 90.0, abs=1e-3)
-    assert port.costs.heading_change == pytest.approx(0.15 * 10.0 / 90.0, abs=1e-3)
+    others = sum(msgspec.structs.astuple(port.costs)) - port.costs.heading_change
+    assert port.costs.heading_change == pytest.approx((0.15 + 0.1 * others) * 10.0 / 90.0, abs=1e-3)
     assert port.costs.progress == pytest.approx(0.3 * (1.0 - math.cos(math.radians(10.0))), abs=1e-3)
     assert port.costs.advice == pytest.approx(0.15 * (1.0 - 10.0 / 25.0), abs=1e-3)
     assert starboard.costs.advice == 0.15
