@@ -74,9 +74,9 @@ class HeadingCosts(msgspec.Struct, frozen=True):
 
     course: off the desired one. progress: made good along it. heading_change: off the plan before. advice: not to the
     advised side. unknown_water: on the path. proximity: to obstacles, and ahead of dynamic ones. path_obstacle: further
-    along the path. margin: how far it is intruded into. give_way: near to the course of a vessel under way.
-    passing_side: such a vessel is left on the other side than courtesy asks for, so that the boat crosses its bow, or
-    passes it starboard to starboard.
+    along the path. margin: how far that of what was seen is intruded into. give_way: near to the course of a vessel
+    under way. passing_side: such a vessel is left on the other side than courtesy asks for, so that the boat crosses
+    its bow, or passes it starboard to starboard.
     """
 
     course: Finite

@@ -49,17 +49,17 @@ class Approach(NamedTuple):
     tcpa_s: float
 
 
-def clearance_field_m(grid: OccupancyGrid, config: PlannerConfig) -> F64:
+def clearance_fields_m(grid: OccupancyGrid, config: PlannerConfig) -> tuple[F64, F64]:
     """Signed distance from the middle of each cell to the nearest static obstacle, at most 4 m [100, 100].
 
-    It is negative inside an obstacle. Occluded cells are taken to have drifted nearer by `hidden_drift_m`, and cells
-    that a person or a vessel out of sight may have reached count as occupied.
+    It is negative inside an obstacle. Occluded cells are taken to have drifted nearer by `hidden_drift_m`. In the first
+    field cells that a person or a vessel out of sight may have reached count as occupied, in the second they do not.
     """
     occluded_m = signed_distance_field_m(grid.occluded) - config.hidden_drift_m
-    field_m = np.minimum(signed_distance_field_m(grid.occupied), occluded_m)
+    seen_m = np.minimum(signed_distance_field_m(grid.occupied), occluded_m)
     if not grid.reachable_unseen.any():
-        return field_m
-    return np.minimum(field_m, signed_distance_field_m(grid.reachable_unseen))
+        return seen_m, seen_m
+    return np.minimum(seen_m, signed_distance_field_m(grid.reachable_unseen)), seen_m
 
 
 def interpolate_fields(grid: OccupancyGrid, fields: Sequence[F64], trajectories: Trajectories) -> list[F64]:

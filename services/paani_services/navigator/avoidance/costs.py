@@ -27,7 +27,9 @@ QUARTER_TURN_RAD = 0.5 * math.pi
 PATH_OBSTACLE_WEIGHT = 3.0  # an obstacle on the path at the boat; it falls linearly to none at `look_m`
 PROXIMITY_WEIGHT = 0.6  # required clearance just kept; it falls with the square to none at PROXIMITY_RANGE_M beyond it
 PROXIMITY_RANGE_M = 2.0
-MARGIN_INTRUSION_WEIGHT = 10.0  # a metre of intrusion into the safety margin, held over the whole horizon
+# A metre of intrusion into the safety margin of what was seen, held over the whole horizon. What may have moved unseen
+# refuses candidates, but a boat at rest there harms nobody, so it is not driven out, and turned away from its course.
+MARGIN_INTRUSION_WEIGHT = 10.0
 UNKNOWN_WATER_WEIGHT = 0.3  # a path all over unknown water: the boat turns to what it sees, and sees further from there
 LOST_PROGRESS_WEIGHT = 0.3  # nothing made good along the desired course
 HEADING_CHANGE_WEIGHT = 0.15  # a quarter turn off the heading of the plan before
@@ -81,7 +83,7 @@ def weigh_candidates(evaluation: CandidateEvaluation, margin_m: F64) -> Candidat
     nearness = np.clip(1.0 - nearest_m / PROXIMITY_RANGE_M, 0.0, 1.0)
     first_m = np.where((margin_m < 0.0) & is_looked_at, travelled_m, np.inf).min(axis=0)
     path_obstacle = np.clip(1.0 - first_m / config.look_m, 0.0, 1.0) if config.look_m > 0.0 else np.zeros_like(first_m)
-    intrusion_m = np.maximum(config.hull_radius_m + config.margin_m - evaluation.clearance_m, 0.0)
+    intrusion_m = np.maximum(config.hull_radius_m + config.margin_m - evaluation.seen_clearance_m, 0.0)
     mean_intrusion_m = np.add.accumulate(np.where(is_in_horizon, intrusion_m, 0.0))[-1] / float(is_in_horizon.sum())
     costs = CandidateCosts(
         course=deviation_rad / QUARTER_TURN_RAD,

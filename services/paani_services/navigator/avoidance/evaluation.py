@@ -9,7 +9,7 @@ from paani.arrays import F64, Bools
 from paani.config import PlannerConfig
 from paani_services.navigator.avoidance.clearance import (
     DynamicClearance,
-    clearance_field_m,
+    clearance_fields_m,
     interpolate_fields,
     is_give_way_needed,
     is_within_horizon,
@@ -41,6 +41,7 @@ class CandidateEvaluation(NamedTuple):
     is_pivot_to_course: whether it is the pivot to the desired course.
     is_in_horizon: times within `horizon_s` [times, 1]; is_in_checked_range: those, or within `room_m` of path.
     static_clearance_m: to static obstacles; clearance_m: to dynamic ones as well; person_distance_m: to seen people.
+    seen_clearance_m: as clearance_m, without what may have moved unseen.
     tight_clearance_m: hull and `tight_margin_m`.
     is_give_way_needed: a dynamic obstacle will come nearer than that to a boat that coasts to rest.
     dynamic: the clearances to each of the request's `predicted_obstacles`.
@@ -61,6 +62,7 @@ class CandidateEvaluation(NamedTuple):
     is_in_checked_range: Bools
     static_clearance_m: F64
     clearance_m: F64
+    seen_clearance_m: F64
     person_distance_m: F64
     is_unknown: Bools
     tight_clearance_m: float
@@ -89,13 +91,14 @@ def evaluate_candidates(request: PlanRequest) -> CandidateEvaluation:
     offsets_rad, speeds_mps = sample_candidates(start, request.setpoint, config)
     trajectories = roll_out(start, offsets_rad, speeds_mps, config)
     paths = with_coasting_and_resting(trajectories, start, config)
-    fields = (clearance_field_m(grid, config), distance_field_m(grid.people), distance_field_m(grid.unknown))
-    static_m, person_m, unknown_m = interpolate_fields(grid, fields, paths)
+    fields_m = (*clearance_fields_m(grid, config), distance_field_m(grid.people), distance_field_m(grid.unknown))
+    static_m, seen_m, person_m, unknown_m = interpolate_fields(grid, fields_m, paths)
     tight_m = config.hull_radius_m + config.tight_margin_m
     is_in_horizon = is_within_horizon(trajectories.time_s, config)[:, None]
     last = int(is_in_horizon.sum()) - 1
     at_rest = BoatState(float(paths.x_m[last, -2]), float(paths.y_m[last, -2]), start.yaw_rad)
     dynamic = predict_clearances(obstacles, paths, config)
+    dynamic_m = least_of_obstacles_m(dynamic.candidates_m)
     coasting_m = np.minimum(static_m[:, -2], least_of_obstacles_m(dynamic.coasting_m))
     deviation_rad = angles_between_rad(offsets_rad, float(offsets_rad[0]))
     is_pivot = speeds_mps == PIVOT_SPEED_FRACTION * speeds_mps[0]
@@ -113,7 +116,8 @@ def evaluate_candidates(request: PlanRequest) -> CandidateEvaluation:
         is_in_horizon=is_in_horizon,
         is_in_checked_range=is_in_horizon | (trajectories.travelled_m <= config.room_m),
         static_clearance_m=static_m[:, :-2],
-        clearance_m=np.minimum(static_m[:, :-2], least_of_obstacles_m(dynamic.candidates_m)),
+        clearance_m=np.minimum(static_m[:, :-2], dynamic_m),
+        seen_clearance_m=np.minimum(seen_m[:, :-2], dynamic_m),
         person_distance_m=person_m[:, :-2],
         is_unknown=unknown_m[:, :-2] < config.hull_radius_m,
         tight_clearance_m=tight_m,

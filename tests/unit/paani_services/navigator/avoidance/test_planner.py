@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from paani.config import load_config
 from paani.messages import Detection, Label
-from paani_services.navigator.avoidance.clearance import clearance_field_m, required_clearance_m
+from paani_services.navigator.avoidance.clearance import clearance_fields_m, required_clearance_m
 from paani_services.navigator.avoidance.constraints import ESCAPE_TOLERANCE_M, MIN_PIVOT_RAD
 from paani_services.navigator.avoidance.rollout import (
     PIVOT_SPEED_FRACTION,
@@ -85,7 +85,7 @@ def clearance_along_m(grid: OccupancyGrid, start: BoatState, found: Plan) -> np.
     trajectories = planned_trajectory(start, found)
     column, row = (trajectories.x_m[:, 0] - grid.west_m) / CELL_M, (trajectories.y_m[:, 0] - grid.south_m) / CELL_M
     near = trajectories.time_s <= PLANNER.horizon_s
-    return np.asarray(clearance_field_m(grid, PLANNER)[row.astype(int), column.astype(int)][near])
+    return np.asarray(clearance_fields_m(grid, PLANNER)[0][row.astype(int), column.astype(int)][near])
 
 
 def test_q4_three_seconds_in_steps_of_0_2() -> None:

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from paani.messages import Detection, Label
-from paani_services.navigator.avoidance.clearance import clearance_field_m
+from paani_services.navigator.avoidance.clearance import clearance_fields_m
 from paani_services.navigator.avoidance.rollout import BoatState, GuidanceSetpoint
 from paani_services.navigator.mapping.observation import ObservationMemory
 from paani_services.navigator.mapping.observed_cells import CELL_M
-from paani_services.navigator.mapping.occupancy_grid import OccupancyGrid, build_occupancy_grid
+from paani_services.navigator.mapping.occupancy_grid import GRID_CELLS, OccupancyGrid, build_occupancy_grid
 from paani_sim.eye.camera import BoatPose
 from tests.synthetic_water import (
     AT_REST,
@@ -24,6 +24,8 @@ from tests.synthetic_water import (
     plan_on,
     water_edge_of,
 )
+
+RESTING = BoatState(0.0, 0.0, 0.0)
 
 
 def turned_away(seconds: float) -> tuple[ObservationMemory, int]:
@@ -46,7 +48,7 @@ def test_a_person_out_of_sight_may_swim_on() -> None:
         grid = build_occupancy_grid(memory.observations, (0.0, 0.0), now_us, CAMERA, PLANNER)
         reached.append(reached_m(grid))
         row, column = np.argwhere(grid.reachable_unseen)[0]
-        assert clearance_field_m(grid, PLANNER)[row, column] < 0.0
+        assert clearance_fields_m(grid, PLANNER)[0][row, column] < 0.0
     assert reached == pytest.approx([4.7 - 1.28, 4.7 - 1.92, 4.7 - 3.2], abs=2.0 * CELL_M)
     memory, now_us = turned_away(8.0)
     for changes in ({"person_mps": 0.0}, {"person_reach_m": 0.0}, {"hidden_s": 0.0}):
@@ -75,6 +77,22 @@ def test_the_boat_goes_slower_where_a_person_may_be(x_m: float, y_m: float) -> N
         plan_on(given, start, setpoint, None, PLANNER) for given in (grid, grid._replace(reachable_unseen=grid.people))
     )
     assert found.speed_mps < at_once.speed_mps
+
+
+@pytest.mark.parametrize("course", [0.0, 0.4])
+def test_a_boat_where_a_person_may_be_goes_on_and_is_not_driven_out(course: float) -> None:
+    """Beside what was seen it turns away before it goes on; beside what may be there it goes on, and no nearer."""
+    none = np.zeros((GRID_CELLS, GRID_CELLS), np.bool_)
+    beside = none.copy()
+    beside[35:48, :] = True  # from 0.4 m to starboard
+    free = OccupancyGrid(-10.0, -10.0, none, none, ~none, none, none, none)
+    setpoint = GuidanceSetpoint(course, 0.6)
+    seen = plan_on(free._replace(occupied=beside, free=~beside), RESTING, setpoint, None, PLANNER)
+    unseen = plan_on(free._replace(reachable_unseen=beside), RESTING, setpoint, None, PLANNER)
+    assert seen.heading_rad > course + 0.2
+    assert unseen.heading_rad == pytest.approx(course, abs=0.2)
+    towards = plan_on(free._replace(reachable_unseen=beside), RESTING, GuidanceSetpoint(-0.8, 0.6), None, PLANNER)
+    assert towards.speed_mps == 0.0 or towards.heading_rad >= 0.0
 
 
 def test_a_person_aboard_is_not_in_the_water() -> None:

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from paani.messages import Label
-from paani_services.navigator.avoidance.clearance import clearance_field_m, predicted_clearance_m
+from paani_services.navigator.avoidance.clearance import clearance_fields_m, predicted_clearance_m
 from paani_services.navigator.avoidance.constraints import ESCAPE_TOLERANCE_M
 from paani_services.navigator.avoidance.rollout import BoatState, GuidanceSetpoint, roll_out
 from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle, find_dynamic_obstacles
@@ -41,7 +41,7 @@ def passed(seconds: float, label: Label = Label.VESSEL) -> tuple[ObservationMemo
 
 def off_m(grid: OccupancyGrid) -> float:
     """Distance ahead of the boat to the nearest cell without clearance."""
-    clear_m = clearance_field_m(grid, PLANNER)
+    clear_m = clearance_fields_m(grid, PLANNER)[0]
     row = int(-grid.south_m / CELL_M)
     columns = np.flatnonzero(clear_m[row] <= 0.0)
     return float(grid.west_m + CELL_M * (columns.min() + 0.5))
@@ -156,7 +156,7 @@ def test_a_boat_leaves_where_an_unseen_obstacle_may_have_got_to(course_deg: floa
     middle_m = CELL_M * (np.arange(GRID_CELLS) + 0.5)
     east_m, north_m = grid.west_m + middle_m[None, :] + 1.6, grid.south_m + middle_m[:, None] - 1.2
     grid = grid._replace(reachable_unseen=(np.hypot(east_m, north_m) < 2.8) & ~grid.free)
-    assert clearance_field_m(grid, PLANNER)[GRID_CELLS // 2, GRID_CELLS // 2] < -0.3
+    assert clearance_fields_m(grid, PLANNER)[0][GRID_CELLS // 2, GRID_CELLS // 2] < -0.3
     coming = DynamicObstacle(np.array([-1.6]), np.array([1.2]), 0.2, Velocity(0.1, -0.08, 0.05), 14.0, frozenset())
     assert predicted_clearance_m(coming, np.zeros(1), np.zeros(1), np.zeros(1))[0] < 0.0  # it may be here
     found = plan_on(grid, start, GuidanceSetpoint(np.radians(course_deg), 0.6), None, PLANNER, (coming,))
