@@ -46,6 +46,16 @@ class Silence:
         self._most = 0
 
 
+async def drive_without_answers(browser: Any, config: Config, orders: Orders) -> tuple[Any, Silence]:
+    """A page that drives by hand, of whose set-points none is answered any more."""
+    page = (await watch(browser, config)).page
+    await arm_on_page(f"http://127.0.0.1:{config.dashboard.port}", config.bus)
+    await drive_manually(page, orders)
+    dead = Silence(page)
+    await page.route("**/api/drive/setpoint", dead)
+    return page, dead
+
+
 async def test_a_stop_without_an_answer_is_asked_again_on_a_new_connection(
     browser: Any, boat: Boat, spawn: Spawn, config: Config
 ) -> None:
@@ -65,11 +75,7 @@ async def test_a_hand_drives_again_after_a_link_that_swallowed_what_it_said(
 ) -> None:
     orders = Orders((await open_as("observer")).latest(keys.OPERATOR_ORDER))
     async with spawn("operator"), spawn("dashboard"):
-        page = (await watch(browser, config)).page
-        await arm_on_page(f"http://127.0.0.1:{config.dashboard.port}", config.bus)
-        await drive_manually(page, orders)
-        dead = Silence(page)
-        await page.route("**/api/drive/setpoint", dead)
+        page, dead = await drive_without_answers(browser, config, orders)
         await page.keyboard.down("w")
         await until(page, "document.querySelector('#drive-note').textContent === 'no answer from the dashboard'")
         assert dead.most_waiting == 3, "no more wait for an answer at once, or a STOP would find no connection"
@@ -86,11 +92,7 @@ async def test_a_stick_at_rest_leaves_room_for_a_stop_on_a_link_that_is_dead(
 ) -> None:
     orders = Orders((await open_as("observer")).latest(keys.OPERATOR_ORDER))
     async with spawn("operator"), spawn("dashboard"):
-        page = (await watch(browser, config)).page
-        await arm_on_page(f"http://127.0.0.1:{config.dashboard.port}", config.bus)
-        await drive_manually(page, orders)
-        dead = Silence(page)
-        await page.route("**/api/drive/setpoint", dead)
+        page, dead = await drive_without_answers(browser, config, orders)
         await until(page, "document.querySelector('#drive-note').textContent === 'no answer from the dashboard'")
         assert dead.most_waiting == 3
 

@@ -6,6 +6,7 @@ not differ significantly from rest is static.
 
 import functools
 import math
+from collections import Counter
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -209,8 +210,7 @@ def _possible_swimmer(track: list[PositionMeasurement], age_s: float, config: Pl
 
 def _commonest_label(track: list[PositionMeasurement]) -> Label:
     """What most pictures show it as; of two as common, what the newest shows it as."""
-    labels = [each.label for each in reversed(track)]
-    return max(labels, key=labels.count)
+    return Counter(each.label for each in reversed(track)).most_common(1)[0][0]
 
 
 def _latest_track_id(track: list[PositionMeasurement]) -> int:
@@ -285,7 +285,7 @@ def _match_nearest(
 
 @functools.lru_cache(maxsize=CACHED_PAIRS)
 def _find_matches(before: MeasuredPicture, after: MeasuredPicture) -> Sequence[Sequence[tuple[float, int]]]:
-    """For each measurement of one picture, the distance and number of those of a later one within its gate."""
+    """For each measurement of one picture, the distance as it counts and number of those of a later one in its gate."""
     within_m = GATE_M + GATE_MPS * ((after.stamp_us - before.stamp_us) * 1e-6)
     return [
         [
@@ -313,8 +313,8 @@ def _measure_positions(observation: Observation, camera: Camera, max_range_m: fl
     camera_model = pinhole_at(observation.pose, camera.calibration, observation.aspect_ratio)
     left, right = np.array([(box.left, box.right) for box in observation.boxes]).T[:, :, None]
     u = (left + (right - left) * ((np.arange(OUTLINE_POINTS) + 0.5) / OUTLINE_POINTS)) / BOX_STEPS
-    v = np.array([(box.bottom,) * OUTLINE_POINTS if _is_level(box) else box.waterline for box in observation.boxes])
-    v = v / BOX_STEPS
+    lines = [(box.bottom,) * OUTLINE_POINTS if _is_level(box) else box.waterline for box in observation.boxes]
+    v = np.array(lines) / BOX_STEPS
     rays = pixel_rays(camera_model, u, np.minimum(v, own_hull_top(camera.ego_polygon, u)))
     range_m = ranges_to_water_m(camera_model, rays, max_range_m)
     east_m: F64 = camera_model.position_m[0] + range_m * rays.east
