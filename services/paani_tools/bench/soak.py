@@ -48,6 +48,7 @@ class Soaked(msgspec.Struct, frozen=True, kw_only=True):
     Anonymous memory is what a process itself has asked for. RSS has pages of files as well, which the kernel takes back
     and brings again by what else the machine does. Lasting: the smaller slope of the two halves of the time, of
     anonymous memory; what is taken once, when something happens first, is in one of them alone.
+    descriptors, threads: the least of each half of the samples: what is opened for a moment is not kept.
     """
 
     restarts: int
@@ -99,7 +100,7 @@ def keeps_bars(report: SoakReport) -> bool:
 def soak_text(report: SoakReport) -> str:
     """The table."""
     rows = [
-        "| process | RSS [MiB] | slope [MiB/h] | of it anonymous | descriptors, first and last | threads | restarts |",
+        "| process | RSS [MiB] | slope [MiB/h] | of it anonymous | descriptors, least of halves | threads | restarts |",
         "|---|---|---|---|---|---|---|",
     ]
     rows += [
@@ -129,9 +130,14 @@ def soaked(samples: Sequence[Sample]) -> Soaked:
         rss_slope_mib_h=slope_per_h((each.at_s, each.rss_mib) for each in warm),
         anonymous_slope_mib_h=slope_per_h((each.at_s, each.anonymous_mib) for each in warm),
         lasting_slope_mib_h=min(slope_per_h(half) for half in halves),
-        descriptors=(warm[0].descriptors, warm[-1].descriptors),
-        threads=(warm[0].threads, warm[-1].threads),
+        descriptors=_least_of_halves([each.descriptors for each in warm]),
+        threads=_least_of_halves([each.threads for each in warm]),
     )
+
+
+def _least_of_halves(counts: Sequence[int]) -> tuple[int, int]:
+    middle = len(counts) // 2
+    return min(counts[:middle]), min(counts[middle:])
 
 
 def slope_per_h(points: Iterable[tuple[float, float]]) -> float:

@@ -63,6 +63,17 @@ def test_descriptors_that_stay_open_break_the_bar() -> None:
     assert not keeps_bars(report(soaked(leaking)))
 
 
+@pytest.mark.parametrize("at", [7, 30, 60])
+def test_what_is_open_for_a_moment_breaks_no_bar_whenever_that_is(at: int) -> None:
+    """A pool begins threads, and a journal opens a file, for the time that something takes."""
+    busy = [
+        msgspec.structs.replace(each, descriptors=19 + 4 * (k == at), threads=9 + 4 * (k == at))
+        for k, each in enumerate(samples(0.0))
+    ]
+    assert keeps_bars(report(soaked(busy)))
+    assert soaked(busy).threads == (9, 9)
+
+
 def test_the_table_names_each_process_and_what_was_dropped() -> None:
     text = soak_text(report(soaked(samples(0.5))))
     assert "| advisor | 50.5 | +0.50 | +1.00 | 19, 19 | 9, 9 | 0 |" in text
