@@ -41,7 +41,7 @@ from paani_sim.worlds.imazu import DEPARTURE_S, IMAZU_SCENARIOS, ROUTE_LENGTH_M,
 PLANNER = load_config().navigator.planner
 STEP_S, TIME_LIMIT_S = 0.2, 240.0
 LENS_DEG, TRACKED_M = 70.0, PLANNER.mover_range_m
-NEAR_DEVIATION_MPS, FAR_DEVIATION_MPS = 0.03, 0.15  # of a velocity beside the boat, and more at `TRACKED_M`
+NEAR_DEVIATION_MPS, FAR_DEVIATION_MPS = 0.03, 0.2  # of a velocity beside the boat, and more at `TRACKED_M`
 ACROSS_FRAC = 0.3  # of that, across the line of sight: bearings are known better than ranges
 ERROR_TIME_S = 2.5  # of the fit: after it the error of a velocity is another
 

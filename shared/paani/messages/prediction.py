@@ -76,7 +76,7 @@ class HeadingCosts(msgspec.Struct, frozen=True):
     advised side. unknown_water: on the path. proximity: to obstacles, and ahead of dynamic ones. path_obstacle: further
     along the path. margin: how far that of what was seen is intruded into. give_way: near to the course of a vessel
     under way. passing_side: such a vessel is left on the other side than courtesy asks for, so that the boat crosses
-    its bow, or passes it starboard to starboard.
+    its bow, or passes it starboard to starboard. collision: how probably such a vessel strikes the boat.
     """
 
     course: Finite
@@ -89,6 +89,7 @@ class HeadingCosts(msgspec.Struct, frozen=True):
     margin: Finite
     give_way: Finite = 0.0
     passing_side: Finite = 0.0
+    collision: Finite = 0.0
 
 
 class HeadingVerdict(msgspec.Struct, frozen=True, kw_only=True):

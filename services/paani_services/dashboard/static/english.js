@@ -289,7 +289,7 @@ export const CONSTRAINTS = {
 export const COSTS = {
   course: "off the course", progress: "little made good", heading_change: "off the plan before", advice: "not to the advised side",
   unknown_water: "unseen water on the way", proximity: "near obstacles", path_obstacle: "obstacle further along",
-  margin: "into the margin", give_way: "near a vessel's course", passing_side: "past a vessel on the other side",
+  margin: "into the margin", give_way: "near a vessel's course", passing_side: "past a vessel on the other side", collision: "may be struck",
 };
 
 /** The headings on the map. */

@@ -5,7 +5,7 @@ velocity and grows with the uncertainty of that velocity.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import msgspec
 import numpy as np
@@ -25,11 +25,12 @@ UNSEEN_GROWTH_MPS = 0.1
 # How far ahead an approach is predicted [s]: a boat needs 20 s to turn away from an obstacle that comes at 0.13 m/s.
 APPROACH_S = 30.0
 WANTED_CPA_M = 3.5  # what swimmers and paddlers want between hulls, 3 m, and half a hull
+UNDER_WAY_MPS = (0.1, 0.2)  # slower for certain: adrift; faster for certain: under way
 ESCAPE_GAIN_M = 0.1  # clearance that a way out must gain [m]: half a cell
 
 
 class DynamicClearance(NamedTuple):
-    """Clearance to the predicted outline of each dynamic obstacle.
+    """Clearance to the predicted outline of each of some dynamic obstacles.
 
     candidates_m: along each candidate [obstacles, times, candidates]. coasting_m: of the boat with its thrusters off
     [obstacles, times]. resting_m: the smallest so far, within the horizon, of a boat that stays where it is [obstacles,
@@ -39,6 +40,10 @@ class DynamicClearance(NamedTuple):
     candidates_m: F64
     coasting_m: F64
     resting_m: F64
+
+    def of(self, which: Bools) -> Self:
+        """Those of some of the obstacles [obstacles]."""
+        return type(self)(*(each[which] for each in self))
 
 
 class Approach(NamedTuple):
@@ -173,16 +178,13 @@ def closest_point_of_approach(obstacle: DynamicObstacle, boat: BoatState) -> App
     return Approach(float(np.hypot(east_m, north_m).min()), float(cpa_m[nearest]), float(time_s[nearest]))
 
 
-def is_give_way_needed(obstacles: Sequence[DynamicObstacle], at_rest: BoatState, limit_m: float) -> bool:
+def is_coming_near(obstacle: DynamicObstacle, at_rest: BoatState, limit_m: float) -> bool:
     """Whether an obstacle that moves for certain will come nearer than the limit to a boat at rest there.
 
     An obstacle that is as near already, and comes no nearer, does not count.
     """
-    for obstacle in obstacles:
-        if not obstacle.is_moving:
-            continue
-        approach = closest_point_of_approach(obstacle, at_rest)
-        room_m = limit_m + obstacle.standoff_m + UNSEEN_GROWTH_MPS * obstacle.age_s
-        if approach.cpa_m < min(room_m, approach.now_m - ESCAPE_GAIN_M):
-            return True
-    return False
+    if not obstacle.is_moving:
+        return False
+    approach = closest_point_of_approach(obstacle, at_rest)
+    room_m = limit_m + obstacle.standoff_m + UNSEEN_GROWTH_MPS * obstacle.age_s
+    return approach.cpa_m < min(room_m, approach.now_m - ESCAPE_GAIN_M)

@@ -21,7 +21,7 @@ from paani_services.navigator.avoidance.clearance import (
     separation_margin_m,
 )
 from paani_services.navigator.avoidance.evaluation import CandidateEvaluation, angles_between_rad
-from paani_services.navigator.avoidance.passages import find_passages
+from paani_services.navigator.avoidance.passages import Passages
 
 QUARTER_TURN_RAD = 0.5 * math.pi
 PATH_OBSTACLE_WEIGHT = 3.0  # an obstacle on the path at the boat; it falls linearly to none at `look_m`
@@ -41,6 +41,8 @@ ADVISED_TURN_RAD = math.radians(25.0)
 # A vessel on a collision course; it falls linearly to none at WANTED_CPA_M. With 2, turning further away is cheaper
 # than not doing so until 2 s before the closest point (2 x 0.6 m/s x 2 s / 3.5 m against 2 / pi, per rad).
 GIVE_WAY_WEIGHT = 2.0
+# To be struck by a vessel for certain. With 12, a tenth less of it is worth a quarter turn off the course.
+COLLISION_WEIGHT = 12.0
 # A vessel that is left on the other side than courtesy asks for; it falls to none from WANTED_CPA_M to twice that.
 # With 1 the other side is taken where it saves more than a quarter turn.
 PASSING_SIDE_WEIGHT = 1.0
@@ -60,6 +62,7 @@ class CandidateCosts(NamedTuple):
     margin: F64
     give_way: F64
     passing_side: F64
+    collision: F64
 
     @property
     def total(self) -> F64:
@@ -67,8 +70,8 @@ class CandidateCosts(NamedTuple):
         return np.asarray(functools.reduce(np.add, self))
 
 
-def weigh_candidates(evaluation: CandidateEvaluation, margin_m: F64) -> CandidateCosts:
-    """The costs of each candidate. margin_m: clearance beyond the required one [times, candidates]."""
+def weigh_candidates(evaluation: CandidateEvaluation, margin_m: F64, passages: Passages) -> CandidateCosts:
+    """The costs of each candidate, without courtesy. margin_m: beyond the required clearance [times, candidates]."""
     request, config, previous = evaluation.request, evaluation.request.config, evaluation.request.previous
     speeds_mps, deviation_rad = evaluation.speeds_mps, evaluation.deviation_rad
     travelled_m, is_in_horizon = evaluation.trajectories.travelled_m, evaluation.is_in_horizon
@@ -96,18 +99,18 @@ def weigh_candidates(evaluation: CandidateEvaluation, margin_m: F64) -> Candidat
         margin=MARGIN_INTRUSION_WEIGHT * mean_intrusion_m,
         give_way=np.zeros_like(deviation_rad),
         passing_side=np.zeros_like(deviation_rad),
+        collision=COLLISION_WEIGHT * passages.collision.max(axis=0, initial=0.0),
     )
     weight = HEADING_CHANGE_WEIGHT + HEADING_CHANGE_FRAC * costs.total
     return costs._replace(heading_change=weight * change_rad / QUARTER_TURN_RAD)
 
 
-def add_courtesy(costs: CandidateCosts, evaluation: CandidateEvaluation, is_refused: Bools) -> CandidateCosts:
+def add_courtesy(costs: CandidateCosts, passages: Passages, is_refused: Bools) -> CandidateCosts:
     """The costs with those of courtesy towards vessels under way (after rules 13 to 17 of the collision regulations).
 
     They lead the boat no further into the safety margin: a candidate that intrudes more than the one it would take
     without courtesy is given their whole weight, and so gains nothing by them.
     """
-    passages = find_passages(evaluation)
     if not passages.weight.any() or is_refused.all():
         return costs
     clearance, scale_m = passages.clearance_m / WANTED_CPA_M, passages.deviation_m + SIDE_SCALE_M
@@ -124,8 +127,9 @@ def add_courtesy(costs: CandidateCosts, evaluation: CandidateEvaluation, is_refu
 
 def _predict_leading(evaluation: CandidateEvaluation) -> DynamicClearance:
     """The clearances where each obstacle will be `lead_s` later; those that do not move are predicted already."""
-    request = evaluation.request
-    leading = [advanced_in_time(each, request.config.lead_s) for each in request.predicted_obstacles if each.is_moving]
-    is_still = [not each.is_moving for each in request.predicted_obstacles]
-    later, still = predict_clearances(leading, evaluation.paths, request.config), evaluation.dynamic
-    return DynamicClearance(*(np.concatenate([each, now[is_still]]) for each, now in zip(later, still, strict=True)))
+    request, obstacles = evaluation.request, evaluation.request.predicted_obstacles
+    is_still = np.array([not each.is_moving for each in obstacles], dtype=np.bool_)
+    is_leading = ~is_still & ~evaluation.runs_down
+    leading = [advanced_in_time(obstacles[k], request.config.lead_s) for k in np.flatnonzero(is_leading)]
+    later, still = predict_clearances(leading, evaluation.paths, request.config), evaluation.predicted.of(is_still)
+    return DynamicClearance(*(np.concatenate(each) for each in zip(later, still, strict=True)))

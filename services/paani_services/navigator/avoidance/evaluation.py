@@ -7,11 +7,13 @@ import numpy as np
 
 from paani.arrays import F64, Bools
 from paani.config import PlannerConfig
+from paani.messages import Label
 from paani_services.navigator.avoidance.clearance import (
+    UNDER_WAY_MPS,
     DynamicClearance,
     clearance_fields_m,
     interpolate_fields,
-    is_give_way_needed,
+    is_coming_near,
     is_within_horizon,
     least_of_obstacles_m,
     predict_clearances,
@@ -27,6 +29,7 @@ from paani_services.navigator.avoidance.rollout import (
     with_coasting_and_resting,
 )
 from paani_services.navigator.mapping.distance_field import distance_field_m
+from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle
 
 # Deviation from the desired course up to which a candidate leads onward [rad]; beyond it less than a quarter of the
 # distance sailed is made good.
@@ -44,7 +47,11 @@ class CandidateEvaluation(NamedTuple):
     seen_clearance_m: as clearance_m, without what may have moved unseen.
     tight_clearance_m: hull and `tight_margin_m`.
     is_give_way_needed: a dynamic obstacle will come nearer than that to a boat that coasts to rest.
-    dynamic: the clearances to each of the request's `predicted_obstacles`.
+    predicted: the clearances to each of the request's `predicted_obstacles`.
+    is_faster: which of them are under way for certain, and faster than the boat may be, but for people [obstacles]. How
+    probably they strike the boat is a cost.
+    runs_down: which of these will come that near to a boat at rest. They refuse nothing, as it is met as well.
+    dynamic: the clearances to all others, which is what the other fields count as dynamic obstacles.
     coasting_clearance_m: the least within the horizon with the thrusters off.
     """
 
@@ -67,6 +74,9 @@ class CandidateEvaluation(NamedTuple):
     is_unknown: Bools
     tight_clearance_m: float
     is_give_way_needed: bool
+    predicted: DynamicClearance
+    is_faster: Bools
+    runs_down: Bools
     dynamic: DynamicClearance
     coasting_clearance_m: float
 
@@ -97,7 +107,10 @@ def evaluate_candidates(request: PlanRequest) -> CandidateEvaluation:
     is_in_horizon = is_within_horizon(trajectories.time_s, config)[:, None]
     last = int(is_in_horizon.sum()) - 1
     at_rest = BoatState(float(paths.x_m[last, -2]), float(paths.y_m[last, -2]), start.yaw_rad)
-    dynamic = predict_clearances(obstacles, paths, config)
+    comes = np.array([is_coming_near(each, at_rest, tight_m) for each in obstacles], dtype=np.bool_)
+    is_faster = np.array([_is_faster(each, float(speeds_mps[0])) for each in obstacles], dtype=np.bool_)
+    predicted, runs_down = predict_clearances(obstacles, paths, config), comes & is_faster
+    dynamic = predicted.of(~runs_down)
     dynamic_m = least_of_obstacles_m(dynamic.candidates_m)
     coasting_m = np.minimum(static_m[:, -2], least_of_obstacles_m(dynamic.coasting_m))
     deviation_rad = angles_between_rad(offsets_rad, float(offsets_rad[0]))
@@ -121,10 +134,21 @@ def evaluate_candidates(request: PlanRequest) -> CandidateEvaluation:
         person_distance_m=person_m[:, :-2],
         is_unknown=unknown_m[:, :-2] < config.hull_radius_m,
         tight_clearance_m=tight_m,
-        is_give_way_needed=is_give_way_needed(obstacles, at_rest, tight_m),
+        is_give_way_needed=bool(comes.any()),
+        predicted=predicted,
+        is_faster=is_faster,
+        runs_down=runs_down,
         dynamic=dynamic,
         coasting_clearance_m=float(coasting_m[: last + 1].min()),
     )
+
+
+def _is_faster(obstacle: DynamicObstacle, limit_mps: float) -> bool:
+    """Whether it is under way for certain and goes faster than the boat may; nobody who swims counts."""
+    velocity, sure_mps = obstacle.velocity, UNDER_WAY_MPS[1]
+    speed_mps = math.hypot(velocity.east_mps, velocity.north_mps)
+    is_under_way = speed_mps - 2.0 * velocity.deviation_mps > sure_mps
+    return obstacle.label is not Label.PERSON and is_under_way and speed_mps > limit_mps
 
 
 def angles_between_rad(angles_rad: F64, other_rad: float) -> F64:

@@ -14,12 +14,18 @@ import numpy as np
 from paani import portable
 from paani.arrays import F64, I64
 from paani.messages import Label
-from paani_services.navigator.avoidance.clearance import APPROACH_S, UNSEEN_GROWTH_MPS, WANTED_CPA_M
+from paani_services.navigator.avoidance.clearance import (
+    APPROACH_S,
+    UNDER_WAY_MPS,
+    UNSEEN_GROWTH_MPS,
+    WANTED_CPA_M,
+    position_deviation_m,
+)
 from paani_services.navigator.avoidance.evaluation import CandidateEvaluation
 from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle
 
 LEAST_CLOSING_MPS = 1e-6  # keeps directions finite
-UNDER_WAY_MPS = (0.1, 0.2)  # slower for certain: adrift; faster for certain: under way
+HULL_SPREAD_M = 0.2  # by which a hull of which the velocity is known may lie elsewhere: a cell
 SOON_S = 15.0  # manoeuvres are due from then on: 13 s before a barge at 3 m/s, 8.5 s before a kayak at 1.5 m/s
 PAST_S = 1.0  # in which an encounter ends: the time that half a hull takes
 # Vessels that meet within this angle (20 degrees) of the reciprocal course pass port to port.
@@ -37,6 +43,9 @@ class Passages(NamedTuple):
     wanted_side: 1 where it should be left to port, -1 to starboard, 0 either, between where its course is between.
     weight: of the encounter, in [0, 1]: none of a vessel that may be adrift, is past, far off, or may be anywhere.
     It is that at the highest speed: who slows down behind a vessel has not put off the encounter.
+    collision: of a vessel that is faster than the boat and met soon, the probability that it strikes the hull. Its
+    distance has Student's t distribution with two degrees of freedom around the least one along the candidate's path:
+    a velocity is fitted to few measurements, and whoever steers may change it.
     """
 
     port_m: F64
@@ -44,6 +53,7 @@ class Passages(NamedTuple):
     deviation_m: F64
     wanted_side: F64
     weight: F64
+    collision: F64
 
     @property
     def clearance_m(self) -> F64:
@@ -59,10 +69,11 @@ class Passages(NamedTuple):
 def find_passages(evaluation: CandidateEvaluation) -> Passages:
     """The passages of the candidates by the vessels that the plan keeps off."""
     paths, request = evaluation.trajectories, evaluation.request
+    known = zip(request.predicted_obstacles, evaluation.predicted.candidates_m, evaluation.is_faster, strict=True)
     vessels = [
         each
-        for each in request.predicted_obstacles
-        if each.label is Label.VESSEL and math.hypot(*each.velocity[:2]) > UNDER_WAY_MPS[0]
+        for each in known
+        if each[0].label is not Label.PERSON and math.hypot(*each[0].velocity[:2]) > UNDER_WAY_MPS[0]
     ]
     last = int(evaluation.is_in_horizon.sum()) - 1
     then_s = float(paths.time_s[last])
@@ -75,16 +86,22 @@ def find_passages(evaluation: CandidateEvaluation) -> Passages:
     course_rad = request.start.yaw_rad + float(evaluation.offsets_rad[0])
     shape = (len(vessels), evaluation.offsets_rad.size)
     found = Passages(*(np.zeros(shape) for _ in Passages._fields))
-    for number, vessel in enumerate(vessels):
-        for row, value in zip(found, _pass(vessel, settled, fastest, course_rad), strict=True):
+    for number, (vessel, clearance_m, is_faster) in enumerate(vessels):
+        distance_m = clearance_m + np.reshape(position_deviation_m(vessel, paths.time_s), (-1, 1))
+        overlap_m = request.config.hull_radius_m - distance_m.min(axis=0)
+        for row, value in zip(found, _pass(vessel, settled, fastest, course_rad, overlap_m), strict=True):
             row[number] = value
+        found.collision[number] *= is_faster
     return found
 
 
-def _pass(vessel: DynamicObstacle, boat: Sequence[F64], fastest: I64, course_rad: float) -> tuple[F64 | float, ...]:
+def _pass(
+    vessel: DynamicObstacle, boat: Sequence[F64], fastest: I64, course_rad: float, overlap_m: F64
+) -> tuple[F64 | float, ...]:
     """One row of `Passages`. boat: east, north, and velocity of each candidate as if it had held that all along.
 
-    fastest: for each candidate, the number of the one with its heading and the highest speed.
+    fastest: for each candidate, the number of the one with its heading and the highest speed. overlap_m: by which the
+    hull reaches into the predicted outline along the candidate's own path; negative: by which it stays clear.
     """
     x_m, y_m, boat_east_mps, boat_north_mps = boat
     velocity = vessel.velocity
@@ -101,18 +118,16 @@ def _pass(vessel: DynamicObstacle, boat: Sequence[F64], fastest: I64, course_rad
     speed_mps = math.hypot(velocity.east_mps, velocity.north_mps)
     speed_variance = float(velocity.variance_along(velocity.east_mps / speed_mps, velocity.north_mps / speed_mps))
     adrift_mps, sure_mps = UNDER_WAY_MPS
-    weight = (
-        _part((speed_mps - 2.0 * math.sqrt(speed_variance) - adrift_mps) / (sure_mps - adrift_mps))
-        * _part(time_s / PAST_S)
-        * _part((APPROACH_S - time_s) / (APPROACH_S - SOON_S))
-        * _part(1.0 - deviation_m / WANTED_CPA_M)
-    )
+    under_way = _part((speed_mps - 2.0 * math.sqrt(speed_variance) - adrift_mps) / (sure_mps - adrift_mps))
+    soon_under_way = under_way * _part((APPROACH_S - time_s) / (APPROACH_S - SOON_S))
+    score = overlap_m / (deviation_m + HULL_SPREAD_M)
     return (
         to_port_m.min(axis=0),
         -to_port_m.max(axis=0),
         deviation_m,
         _wanted_side(vessel, speed_mps, course_rad),
-        weight,
+        soon_under_way * _part(time_s / PAST_S) * _part(1.0 - deviation_m / WANTED_CPA_M),
+        soon_under_way * 0.5 * (1.0 + score / np.sqrt(2.0 + score * score)),
     )
 
 

@@ -26,6 +26,7 @@ from paani_services.navigator.avoidance.constraints import (
 )
 from paani_services.navigator.avoidance.costs import CandidateCosts, add_courtesy, weigh_candidates
 from paani_services.navigator.avoidance.evaluation import CandidateEvaluation, evaluate_candidates
+from paani_services.navigator.avoidance.passages import find_passages
 from paani_services.navigator.avoidance.request import PlanRequest
 from paani_services.navigator.avoidance.rollout import Plan
 
@@ -75,14 +76,15 @@ def judge_candidates(request: PlanRequest) -> JudgedCandidates | None:
     evaluation = evaluate_candidates(request)
     hard = hard_constraints(evaluation)
     check = check_margins(evaluation, hard)
-    costs = weigh_candidates(evaluation, check.margin_m)
+    passages = find_passages(evaluation)
+    costs = weigh_candidates(evaluation, check.margin_m, passages)
     is_waiting = request.may_wait and evaluation.is_safe_at_rest and _is_held_up(evaluation, check)
     if is_waiting:
         refusals = while_waiting(evaluation, hard, check)
     else:
         situations = _situations(evaluation, hard, check)
         refusals = next((each for each in situations if not any_refusal(each).all()), check.refusals)
-    costs = add_courtesy(costs, evaluation, any_refusal(refusals))
+    costs = add_courtesy(costs, passages, any_refusal(refusals))
     return JudgedCandidates(evaluation, refusals, costs, is_waiting)
 
 

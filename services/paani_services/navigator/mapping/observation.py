@@ -25,6 +25,7 @@ OLD_OBSERVATIONS = 25  # kept for what is out of sight, evenly over `hidden_s`; 
 BOX_SPACING_US = 190_000  # between those kept for their boxes alone
 MAX_OBSERVATIONS = 224
 OUTLINE_POINTS = 9  # of a box's waterline
+MIN_HULL_COLUMNS = 6  # of the mask, in which it shows a waterline that no single column decides
 SMALL_LABELS = frozenset({Label.PERSON, Label.BUOY})  # the lower end of the box is where these stand
 MOVABLE_LABELS = frozenset({Label.PERSON, Label.BUOY, Label.VESSEL})
 CARRIER_LABELS = frozenset({Label.VESSEL, Label.PIER})  # a person may stand on these
@@ -283,11 +284,13 @@ def _make_box(detection: Detection, water_edge: tuple[float, ...]) -> ObstacleBo
     """The box of what may move, with its waterline.
 
     It meets the water at its lower end; a hull does where the mask ends the water, if that is in the box's lower half.
+    What is as wide as a hull is one, whatever the detector calls it, but for a person.
     """
     x1, y1, x2, y2 = detection.box_xyxy
     left, top, right, bottom = (BOX_STEPS * side for side in detection.box_xyxy)
     waterline = [math.ceil(bottom)] * OUTLINE_POINTS
-    if detection.label not in SMALL_LABELS:
+    is_wide = detection.label is not Label.PERSON and (x2 - x1) * len(water_edge) >= MIN_HULL_COLUMNS
+    if detection.label not in SMALL_LABELS or is_wide:
         for number in range(OUTLINE_POINTS):
             u = x1 + (x2 - x1) * (number + 0.5) / OUTLINE_POINTS
             seen = water_edge[min(max(int(u * len(water_edge)), 0), len(water_edge) - 1)]

@@ -25,7 +25,8 @@ class PositionMeasurement(NamedTuple):
 
     box_id: as in `BoxIds`. gate_deviation_m: by which its range may be wrong in a picture whose box is.
     outline: points where it meets the water, from left to right.
-    shows_ends: whether the picture shows its left and its right end. track_id: the advisor's track of it; 0: unknown.
+    shows_ends: whether the picture shows its left and its right end. size_m: width and height of its box at its range.
+    track_id: the advisor's track of it; 0: unknown.
     """
 
     box_id: tuple[int, int]
@@ -35,6 +36,7 @@ class PositionMeasurement(NamedTuple):
     gate_deviation_m: float
     outline: tuple[F64, F64]
     shows_ends: tuple[bool, bool]
+    size_m: PlaneVector
     track_id: int = 0
 
     @property

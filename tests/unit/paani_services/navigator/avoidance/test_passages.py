@@ -200,8 +200,9 @@ def test_courtesy_never_leads_further_into_the_margin(
     evaluation = evaluate(vessel(*place, *velocity), grid=WATER._replace(occupied=occupied, free=~occupied))
     hard = hard_constraints(evaluation)
     check = check_margins(evaluation, hard)
-    plain, is_refused = weigh_candidates(evaluation, check.margin_m), any_refusal(check.refusals)
-    costs = add_courtesy(plain, evaluation, is_refused)
+    passages, is_refused = find_passages(evaluation), any_refusal(check.refusals)
+    plain = weigh_candidates(evaluation, check.margin_m, passages)
+    costs = add_courtesy(plain, passages, is_refused)
     assert (costs.give_way <= GIVE_WAY_WEIGHT).all()
     assert (costs.passing_side <= PASSING_SIDE_WEIGHT).all()
     if is_refused.all() or costs is plain:

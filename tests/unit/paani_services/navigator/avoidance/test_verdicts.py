@@ -94,7 +94,7 @@ def test_in_open_water_the_course_costs_nothing_and_others_by_name() -> None:
     assert msgspec.structs.asdict(straight.costs) == {
         "course": 0.0, "progress": 0.0, "heading_change": 0.0, "advice": 0.15, "path_obstacle": 0.0, "margin": 0.0,
         "unknown_water": straight.costs.unknown_water, "proximity": pytest.approx(0.0, abs=0.01),
-        "give_way": 0.0, "passing_side": 0.0,
+        "give_way": 0.0, "passing_side": 0.0, "collision": 0.0,
     }  # fmt: skip
     assert port.costs.course == starboard.costs.course == pytest.approx(10.0 / 90.0, abs=1e-3)
     others = sum(msgspec.structs.astuple(port.costs)) - port.costs.heading_change

@@ -324,17 +324,18 @@ def test_three_pictures_are_too_few_for_a_velocity(pictures: int, count: int) ->
 
 
 def test_a_track_goes_on_over_a_box_that_ends_too_low() -> None:
-    """One picture's box of a hull that comes is a tenth longer downwards, which is 2 m nearer."""
+    """One picture's box of a narrow thing that comes is a tenth longer downwards, which is 2 m nearer."""
     memory, at_us = ObservationMemory(), START_US
     for number in range(10):
         at_us, ahead_m = START_US + 200_000 * number, 12.0 - 0.3 * number
-        box = detection_of((ahead_m, -1.2, ahead_m + 0.4, 1.2), 1.8, Label.BUOY)
-        if number == 6:
+        box = detection_of((ahead_m, -0.3, ahead_m + 0.4, 0.3), 1.8, Label.BUOY)
+        if number == 3:
             x1, y1, x2, y2 = box.box_xyxy
             box = msgspec.structs.replace(box, box_xyxy=(x1, y1, x2, y2 + 0.1 * (y2 - y1)))
         memory = observe_from(at_us=at_us, memory=memory, detections=(box,))
     (found,) = find_dynamic_obstacles(memory.observations, at_us, CAMERA, PLANNER)
     assert found.velocity.east_mps == pytest.approx(-1.5, abs=2.0 * found.velocity.deviation_mps)
+    assert (START_US + 600_000, 0) in found.vacated_boxes
 
 
 def test_a_vessel_and_a_buoy_beside_each_other_are_told_apart() -> None:

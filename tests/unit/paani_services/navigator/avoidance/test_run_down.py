@@ -1,0 +1,215 @@
+"""A vessel that would run the boat down is left while there is time, at the speed that the boat has."""
+
+from __future__ import annotations
+
+import functools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from paani.messages import Label
+from paani_services.navigator.avoidance.clearance import UNDER_WAY_MPS, predicted_clearance_m
+from paani_services.navigator.avoidance.constraints import any_refusal, hard_constraints
+from paani_services.navigator.avoidance.evaluation import CandidateEvaluation, evaluate_candidates
+from paani_services.navigator.avoidance.passages import find_passages
+from paani_services.navigator.avoidance.planner import judge_candidates
+from paani_services.navigator.avoidance.rollout import BoatState, GuidanceSetpoint, Plan, roll_out
+from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle
+from paani_services.navigator.mapping.occupancy_grid import OccupancyGrid, build_occupancy_grid
+from paani_services.navigator.mapping.velocity_fit import Velocity
+from paani_sim.eye.camera import BoatPose
+from tests.synthetic_water import CAMERA, PLANNER, START_US, observe_from, plan_on, request_on, water_edge_of
+
+CRUISING, RESTING = BoatState(0.0, 0.0, 0.0, 0.6), BoatState(0.0, 0.0, 0.0)
+AHEAD = GuidanceSetpoint(0.0, 0.6)
+HALF_BEAM_M, LENGTH_M = 0.9, 13.0
+STEP_S = 0.4
+
+
+@functools.cache
+def open_water() -> OccupancyGrid:
+    return build_occupancy_grid(observe_from().observations, (0.0, 0.0), START_US, CAMERA, PLANNER)
+
+
+def vessel_from(
+    bearing_rad: float, speed_mps: float, in_s: float, label: Label = Label.VESSEL, aside_m: float = 0.0
+) -> DynamicObstacle:
+    """The bow of a vessel that passes the origin that far aside in so many seconds."""
+    ahead, across = np.array([math.cos(bearing_rad), math.sin(bearing_rad)]), np.zeros(2)
+    across[:] = -ahead[1], ahead[0]
+    bow = ahead * speed_mps * in_s + across * aside_m
+    outline = [bow + each * across for each in np.linspace(-HALF_BEAM_M, HALF_BEAM_M, 9)]
+    velocity = Velocity(-speed_mps * float(ahead[0]), -speed_mps * float(ahead[1]), 0.2)
+    easts, norths = np.array(outline).T
+    return DynamicObstacle(easts, norths, 0.2, velocity, 0.1, frozenset(), label=label)
+
+
+def evaluate(
+    vessel: DynamicObstacle, start: BoatState = RESTING, grid: OccupancyGrid | None = None
+) -> CandidateEvaluation:
+    return evaluate_candidates(request_on(grid or open_water(), start, AHEAD, None, PLANNER, (vessel,)))
+
+
+def gap_m(boat: BoatState, bow: DynamicObstacle) -> float:
+    """From the boat's middle to the side of a vessel with this bow, of `LENGTH_M`."""
+    speed_mps = math.hypot(*bow.velocity[:2])
+    east, north = bow.velocity.east_mps / speed_mps, bow.velocity.north_mps / speed_mps
+    x_m, y_m = boat.x_m - float(bow.east_m.mean()), boat.y_m - float(bow.north_m.mean())
+    along_m, aside_m = x_m * east + y_m * north, abs(y_m * east - x_m * north)
+    return math.hypot(max(along_m, 0.0, -LENGTH_M - along_m), max(aside_m - HALF_BEAM_M, 0.0))
+
+
+def least_gap_m(start: BoatState, vessel: DynamicObstacle, for_s: float) -> float:
+    """The least `gap_m` of a boat that moves as the planner expects and is given a plan every `STEP_S`."""
+    boat, previous, least_m = start, None, math.inf
+    for number in range(round(for_s / STEP_S)):
+        now_s = number * STEP_S
+        east_m, north_m = (
+            at + now_s * by for at, by in zip((vessel.east_m, vessel.north_m), vessel.velocity[:2], strict=True)
+        )
+        seen = vessel._replace(east_m=east_m, north_m=north_m)
+        least_m = min(least_m, gap_m(boat, seen))
+        memory = observe_from(BoatPose(boat.x_m, boat.y_m, boat.yaw_rad))
+        grid = build_occupancy_grid(memory.observations, (boat.x_m, boat.y_m), START_US, CAMERA, PLANNER)
+        previous = plan_on(grid, boat, AHEAD, previous, PLANNER, (seen,))
+        boat = _moved(boat, previous)
+    return least_m
+
+
+def _moved(boat: BoatState, plan: Plan) -> BoatState:
+    """The boat `STEP_S` later, which is two steps of the planner's simulation."""
+    off_rad = math.remainder(plan.heading_rad - boat.yaw_rad, 2.0 * math.pi) if plan.speed_mps else 0.0
+    path = roll_out(boat, np.array([off_rad]), np.array([plan.speed_mps]), PLANNER)
+    x_m, y_m = path.x_m[:3, 0], path.y_m[:3, 0]
+    surge_mps = float(
+        np.clip(plan.speed_mps - boat.surge_mps, -PLANNER.accel_mps2 * STEP_S, PLANNER.accel_mps2 * STEP_S)
+    )
+    helm = float(np.clip(off_rad / 0.5, -1.0, 1.0)) * PLANNER.yaw_rate_radps
+    most_radps = PLANNER.yaw_accel_radps2 * STEP_S
+    rate_radps = boat.yaw_rate_radps + float(np.clip(helm - boat.yaw_rate_radps, -most_radps, most_radps))
+    yaw_rad = math.remainder(boat.yaw_rad + STEP_S * 0.5 * (rate_radps + boat.yaw_rate_radps), 2.0 * math.pi)
+    return BoatState(float(x_m[-1]), float(y_m[-1]), yaw_rad, boat.surge_mps + surge_mps, rate_radps)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("start", [RESTING, CRUISING], ids=["at rest", "under way"])
+@pytest.mark.parametrize("speed_mps", [1.0, 1.5, 2.2, 3.0])
+@pytest.mark.parametrize("bearing_deg", [0.0, 15.0, -25.0, 60.0, -90.0])
+def test_a_vessel_that_is_known_for_six_seconds_strikes_nobody(
+    start: BoatState, speed_mps: float, bearing_deg: float
+) -> None:
+    vessel = vessel_from(math.radians(bearing_deg), speed_mps, 6.0, aside_m=0.3)
+    assert least_gap_m(start, vessel, 10.0) > 0.45
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    bearing_rad=st.floats(-2.0, 2.0),
+    speed_mps=st.floats(0.9, 3.0),
+    in_s=st.floats(4.0, 9.0),
+    aside_m=st.floats(-1.2, 1.2),
+    surge_mps=st.floats(0.0, 0.6),
+)
+def test_a_boat_is_never_left_at_rest_before_what_runs_it_down(
+    bearing_rad: float, speed_mps: float, in_s: float, aside_m: float, surge_mps: float
+) -> None:
+    """In open water it goes, on a path that is no likelier to be met than that of any slower candidate there."""
+    vessel = vessel_from(bearing_rad, speed_mps, in_s, aside_m=aside_m)
+    start = RESTING._replace(surge_mps=surge_mps)
+    judged = judge_candidates(request_on(open_water(), start, AHEAD, None, PLANNER, (vessel,)))
+    assert judged is not None
+    if not judged.evaluation.runs_down.any():
+        return
+    assert judged.cheapest_plan().speed_mps > 0.0
+    feasible = ~any_refusal(judged.refusals)
+    chosen = int(np.where(feasible, judged.costs.total, np.inf).argmin())
+    collision = find_passages(judged.evaluation).collision[0]
+    assert collision[chosen] <= collision[feasible].min() + 0.35
+    assert feasible[judged.evaluation.is_full_speed].any()
+
+
+@pytest.mark.parametrize(
+    ("label", "speed_mps", "deviation_mps", "aside_m", "runs_down"),
+    [
+        (Label.VESSEL, 2.0, 0.2, 0.0, True),
+        (Label.BUOY, 2.0, 0.2, 0.0, True),  # what goes like that is none, whatever the detector calls it
+        (Label.PERSON, 2.0, 0.2, 0.0, False),
+        (Label.VESSEL, 0.55, 0.05, 0.0, False),  # the boat is as fast
+        (Label.VESSEL, 0.7, 0.26, 0.0, False),  # it may be adrift
+        (Label.VESSEL, 2.0, 0.2, 3.5, False),  # it passes by
+    ],
+)
+def test_what_runs_a_boat_down_is_fast_for_certain_and_not_a_person(
+    label: Label, speed_mps: float, deviation_mps: float, aside_m: float, *, runs_down: bool
+) -> None:
+    """Everything else refuses candidates as before."""
+    found = vessel_from(0.0, speed_mps, 5.0, label, aside_m)
+    found = found._replace(velocity=found.velocity._replace(deviation_mps=deviation_mps))
+    evaluation = evaluate(found)
+    assert evaluation.runs_down.tolist() == [runs_down]
+    assert len(evaluation.dynamic.candidates_m) == (0 if runs_down else 1)
+
+
+@settings(max_examples=25, deadline=None)
+@given(bearing_rad=st.floats(-1.5, 1.5), side_m=st.floats(0.75, 1.9), in_s=st.floats(2.0, 8.0))
+def test_nobody_is_fled_from_into_what_stands_beside_the_boat(bearing_rad: float, side_m: float, in_s: float) -> None:
+    """A plan before a vessel that runs the boat down keeps off a wall beside it as a plan without the vessel may."""
+    edge = water_edge_of(BoatPose(0.0, 0.0, 0.0), ((0.8, side_m, 6.0, side_m + 0.6),))
+    grid = build_occupancy_grid(observe_from(edge=edge).observations, (0.0, 0.0), START_US, CAMERA, PLANNER)
+    evaluation = evaluate(vessel_from(bearing_rad, 2.0, in_s), grid=grid)
+    alone = evaluate_candidates(request_on(grid, RESTING, AHEAD, None, PLANNER))
+    with_vessel, without = hard_constraints(evaluation), hard_constraints(alone)
+    if evaluation.runs_down.all():
+        assert all((with_vessel[name] == without[name]).all() for name in with_vessel)
+        assert (evaluation.static_clearance_m == alone.static_clearance_m).all()
+
+
+def test_the_probability_of_a_blow_falls_with_the_distance_and_rises_with_what_is_unknown() -> None:
+    by_aside = [
+        find_passages(evaluate(vessel_from(0.0, 2.0, 5.0, aside_m=each))).collision[0, 0]
+        for each in (0.0, 1.4, 2.5, 4.0)
+    ]
+    assert by_aside == sorted(by_aside, reverse=True)
+    assert by_aside[0] > 0.5
+    assert by_aside[-1] < 0.2
+    far = vessel_from(0.0, 2.0, 5.0, aside_m=2.5)
+    known, hardly = (
+        find_passages(evaluate(far._replace(velocity=far.velocity._replace(deviation_mps=each)))).collision[0, 0]
+        for each in (0.05, 0.5)
+    )
+    assert known < hardly
+
+
+@pytest.mark.parametrize(
+    ("speed_mps", "aside_m", "is_weighed"), [(2.0, 0.0, True), (2.0, 2.5, True), (0.5, 0.0, False)]
+)
+def test_a_blow_is_weighed_of_what_cannot_be_outrun(speed_mps: float, aside_m: float, *, is_weighed: bool) -> None:
+    """Of that also where a boat at rest would be passed by: it is not steered back into. What is slow is kept off."""
+    found = vessel_from(0.0, speed_mps, 5.0, aside_m=aside_m)
+    found = found._replace(velocity=found.velocity._replace(deviation_mps=0.1))
+    assert bool(find_passages(evaluate(found)).collision.max() > 0.05) is is_weighed
+
+
+@pytest.mark.parametrize("label", [Label.VESSEL, Label.BUOY])
+def test_what_refuses_nothing_is_weighed(label: Label) -> None:
+    """However fast it is, and however well that is known, an obstacle refuses candidates or costs them something."""
+    for speed_mps in np.linspace(0.3, 2.5, 12).tolist():
+        for deviation_mps in (0.05, 0.2, 0.4, 0.8, 1.2):
+            found = vessel_from(0.0, speed_mps, 5.0, label)
+            found = found._replace(velocity=found.velocity._replace(deviation_mps=deviation_mps))
+            evaluation = evaluate(found)
+            if evaluation.runs_down.any():
+                assert speed_mps - 2.0 * deviation_mps > UNDER_WAY_MPS[1]
+                assert find_passages(evaluation).collision.max() > 0.3
+
+
+def test_the_gap_is_that_to_the_outline() -> None:
+    """What the closed loop above measures by."""
+    vessel = vessel_from(0.0, 1.0, 5.0)
+    ahead_m = predicted_clearance_m(vessel, np.zeros(1), np.zeros(1), np.zeros(1))[0]
+    assert gap_m(RESTING, vessel) == pytest.approx(5.0)
+    assert ahead_m < 5.0
+    assert gap_m(BoatState(8.0, 2.0, 0.0), vessel) == pytest.approx(2.0 - HALF_BEAM_M)
