@@ -32,10 +32,10 @@ async def test_a_replay_raises_no_alarm(
     async with spawn("dashboard"):
         watched = await watch(browser, config)
         page = watched.page
-        for _ in range(8):
-            odometry.put(m.Odometry(source_us=WallClock().now_us(), x_m=1.0, y_m=2.0, yaw_rad=0.0, surge_mps=0.4))
-            await asyncio.sleep(0.1)
-        await until(page, "document.querySelector('#speed').textContent === '0.40'")
+        async with asyncio.timeout(30.0):  # however long the page takes to begin
+            while await page.inner_text("#speed") != "0.40":
+                odometry.put(m.Odometry(source_us=WallClock().now_us(), x_m=1.0, y_m=2.0, yaw_rad=0.0, surge_mps=0.4))
+                await asyncio.sleep(0.1)
         assert await page.inner_text("#mode") == "REPLAY"
         await until(page, "paani.link === 'ended'")
         await page.wait_for_timeout(300)
