@@ -109,8 +109,11 @@ def _measure_position(
 def _waterline_of_hull(box: ObstacleBox) -> tuple[int, ...]:
     """The waterline with ends that lie more than `BESIDE_ROWS` above what is next to them lowered to that.
 
-    A box is a little wider than the hull in it: there the mask shows the water beside the hull, or behind it.
+    A box is a little wider than the hull in it: there the mask shows the water beside the hull, or behind it. Of a hull
+    that the picture's side cuts, the end itself is followed, where it is.
     """
+    if not all(_shown_ends(box)):
+        return box.waterline
     first, second, *_, last_but_one, last = box.waterline
     most = round(BESIDE_ROWS * MASK_ROW_FRAC * BOX_STEPS)
     first = second if second - first > most else first
@@ -131,4 +134,4 @@ def _is_level(box: ObstacleBox) -> bool:
     """
     highest = min(box.waterline)
     is_near_end = highest >= box.bottom - MASK_ROW_FRAC * BOX_STEPS
-    return highest == box.bottom or (is_near_end and all(_shown_ends(box)))
+    return (box.is_small and highest == box.bottom) or (is_near_end and all(_shown_ends(box)))

@@ -45,6 +45,22 @@ def test_a_box_that_is_wider_than_its_hull_is_measured_at_the_hull(ahead_m: floa
     assert found_m == pytest.approx(ahead_m, abs=0.1 * ahead_m)
 
 
+def test_the_end_of_a_hull_that_the_picture_cuts_stays_where_it_is() -> None:
+    """Its motion is that of the end in sight: one that is taken to be nearer in some pictures would move."""
+    hull = bow_at(6.0, wider=0.1)
+    x1, y1, x2, y2 = hull.box_xyxy
+    low = msgspec.structs.replace(hull, box_xyxy=(x1, y1, x2, y2 + 0.1))
+    cut = msgspec.structs.replace(low, box_xyxy=(0.0, *low.box_xyxy[1:]))
+    ends_m, beside = [], 0.5 * (y1 + y2 + 0.1) + 0.01
+    for box in (low, cut):
+        edge = tuple(beside if u > x2 - 0.15 * (x2 - x1) else y2 for u in (np.arange(80) + 0.5) / 80)
+        memory = observe_from(edge=edge, detections=(box,))
+        (picture,) = measure_positions(memory.observations[-1], CAMERA, 60.0).measurements
+        ends_m.append(float(picture.outline[0][-1]) - float(picture.outline[0][-2]))
+    assert ends_m[0] == pytest.approx(0.0, abs=0.1)
+    assert ends_m[1] > 2.0
+
+
 def test_what_is_as_wide_as_a_hull_stands_where_the_mask_ends_the_water() -> None:
     """Its box reaches down its reflection; the mask is not asked about people, and about what is narrow."""
     for label, is_by_mask in ((Label.VESSEL, True), (Label.BUOY, True), (Label.PERSON, False)):
