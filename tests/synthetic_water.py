@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from typing import Any
 
@@ -16,7 +17,7 @@ from paani_services.navigator.avoidance.verdicts import tell_headings
 from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle
 from paani_services.navigator.mapping.observation import ObservationMemory, update_memory
 from paani_services.navigator.mapping.observed_cells import CELL_M, Camera
-from paani_services.navigator.mapping.occupancy_grid import OccupancyGrid
+from paani_services.navigator.mapping.occupancy_grid import OccupancyGrid, build_occupancy_grid
 from paani_sim.eye.camera import BoatPose, camera_pose, project
 from paani_sim.eye.configured_camera import build_camera
 
@@ -100,6 +101,12 @@ def observe_from(
     water_edge = edge if edge is not None else water_edge_of(boat)
     memory = move_to(memory, at_us, boat)
     return update_memory(memory, None, evidence(at_us, water_edge, **changes), PLANNER)
+
+
+@functools.cache
+def open_water() -> OccupancyGrid:
+    """What a boat at rest maps of open water."""
+    return build_occupancy_grid(observe_from().observations, (0.0, 0.0), START_US, CAMERA, PLANNER)
 
 
 def observe_then_look_astern(

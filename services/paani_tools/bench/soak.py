@@ -123,21 +123,16 @@ def soaked(samples: Sequence[Sample]) -> Soaked:
     warm_s = samples[0].at_s + min(WARM_UP * driven_s, WARM_UP_MAX_S)
     warm = [each for each in samples if each.at_s >= warm_s]
     middle = len(warm) // 2
-    halves = [[(each.at_s, each.anonymous_mib) for each in half] for half in (warm[:middle], warm[middle:])]
+    first, second = halves = warm[:middle], warm[middle:]
     return Soaked(
         restarts=len({each.pid for each in samples}) - 1,
         rss_mib=warm[-1].rss_mib,
         rss_slope_mib_h=slope_per_h((each.at_s, each.rss_mib) for each in warm),
         anonymous_slope_mib_h=slope_per_h((each.at_s, each.anonymous_mib) for each in warm),
-        lasting_slope_mib_h=min(slope_per_h(half) for half in halves),
-        descriptors=_least_of_halves([each.descriptors for each in warm]),
-        threads=_least_of_halves([each.threads for each in warm]),
+        lasting_slope_mib_h=min(slope_per_h((each.at_s, each.anonymous_mib) for each in half) for half in halves),
+        descriptors=(min(each.descriptors for each in first), min(each.descriptors for each in second)),
+        threads=(min(each.threads for each in first), min(each.threads for each in second)),
     )
-
-
-def _least_of_halves(counts: Sequence[int]) -> tuple[int, int]:
-    middle = len(counts) // 2
-    return min(counts[:middle]), min(counts[middle:])
 
 
 def slope_per_h(points: Iterable[tuple[float, float]]) -> float:

@@ -56,8 +56,7 @@ def assess_encounter(
         kind = EncounterClass.NONE
     elif before is EncounterClass.NONE and approach.cpa_m - cpa_std_m < WANTED_CPA_M:
         bearing_deg, aspect_deg = _bearing_and_aspect_deg(obstacle, boat, 0.0)
-        target_mps = math.hypot(obstacle.velocity.east_mps, obstacle.velocity.north_mps)
-        kind = classify_encounter(bearing_deg, aspect_deg, boat.surge_mps, target_mps)
+        kind = classify_encounter(bearing_deg, aspect_deg, boat.surge_mps, obstacle.velocity.speed_mps)
     return Encounter(obstacle, kind, approach, cpa_std_m)
 
 

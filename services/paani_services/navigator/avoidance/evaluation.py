@@ -145,9 +145,8 @@ def evaluate_candidates(request: PlanRequest) -> CandidateEvaluation:
 
 def _is_faster(obstacle: DynamicObstacle, limit_mps: float) -> bool:
     """Whether it is under way for certain and goes faster than the boat may; nobody who swims counts."""
-    velocity, sure_mps = obstacle.velocity, UNDER_WAY_MPS[1]
-    speed_mps = math.hypot(velocity.east_mps, velocity.north_mps)
-    is_under_way = speed_mps - 2.0 * velocity.deviation_mps > sure_mps
+    speed_mps = obstacle.velocity.speed_mps
+    is_under_way = speed_mps - 2.0 * obstacle.velocity.deviation_mps > UNDER_WAY_MPS[1]
     return obstacle.label is not Label.PERSON and is_under_way and speed_mps > limit_mps
 
 

@@ -71,9 +71,9 @@ def find_passages(evaluation: CandidateEvaluation) -> Passages:
     paths, request = evaluation.trajectories, evaluation.request
     known = zip(request.predicted_obstacles, evaluation.predicted.candidates_m, evaluation.is_faster, strict=True)
     vessels = [
-        each
-        for each in known
-        if each[0].label is not Label.PERSON and math.hypot(*each[0].velocity[:2]) > UNDER_WAY_MPS[0]
+        (obstacle, clearance_m, is_faster)
+        for obstacle, clearance_m, is_faster in known
+        if obstacle.label is not Label.PERSON and obstacle.velocity.speed_mps > UNDER_WAY_MPS[0]
     ]
     last = int(evaluation.is_in_horizon.sum()) - 1
     then_s = float(paths.time_s[last])
@@ -115,7 +115,7 @@ def _pass(
     across_variance = np.where(closing_mps > LEAST_CLOSING_MPS, across_variance, across_variance[fastest])
     unknown_s = vessel.age_s + np.minimum(np.maximum(time_s, 0.0), APPROACH_S)
     deviation_m = np.sqrt(across_variance) * unknown_s + UNSEEN_GROWTH_MPS * vessel.age_s
-    speed_mps = math.hypot(velocity.east_mps, velocity.north_mps)
+    speed_mps = velocity.speed_mps
     speed_variance = float(velocity.variance_along(velocity.east_mps / speed_mps, velocity.north_mps / speed_mps))
     adrift_mps, sure_mps = UNDER_WAY_MPS
     under_way = _part((speed_mps - 2.0 * math.sqrt(speed_variance) - adrift_mps) / (sure_mps - adrift_mps))

@@ -138,7 +138,7 @@ def _estimate_drift(track: list[PositionMeasurement], complete: list[PositionMea
     if velocity is None:
         return None
     deviation_mps = max(velocity.deviation_mps, MIN_DRIFT_DEVIATION_MPS)
-    if math.hypot(*velocity[:2]) - 2.0 * deviation_mps > MAX_DRIFT_MPS:
+    if velocity.speed_mps - 2.0 * deviation_mps > MAX_DRIFT_MPS:
         return None
     return velocity._replace(deviation_mps=deviation_mps)
 

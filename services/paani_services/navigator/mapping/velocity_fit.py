@@ -61,6 +61,11 @@ class Velocity(NamedTuple):
     deviation_mps: float
     covariance: SymmetricMatrix | None = None
 
+    @property
+    def speed_mps(self) -> float:
+        """Its magnitude."""
+        return math.hypot(self.east_mps, self.north_mps)
+
     def variance_along(self, east: F64 | float, north: F64 | float) -> F64 | float:
         """The variance of its component along this unit vector."""
         square = self.deviation_mps * self.deviation_mps

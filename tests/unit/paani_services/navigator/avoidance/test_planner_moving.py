@@ -31,6 +31,7 @@ from tests.synthetic_water import (
     detection_of,
     observe_from,
     odometry,
+    open_water,
     plan_on,
     static_distances_m,
     water_edge_of,
@@ -38,10 +39,6 @@ from tests.synthetic_water import (
 
 CRUISING, RESTING = BoatState(0.0, 0.0, 0.0, 0.6), BoatState(0.0, 0.0, 0.0)
 AHEAD = GuidanceSetpoint(0.0, 0.6)
-
-
-def open_water() -> OccupancyGrid:
-    return build_occupancy_grid(observe_from().observations, (0.0, 0.0), START_US, CAMERA, PLANNER)
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])

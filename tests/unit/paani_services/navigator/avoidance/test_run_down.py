@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import functools
 import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from paani.messages import Label
@@ -16,22 +15,27 @@ from paani_services.navigator.avoidance.constraints import any_refusal, hard_con
 from paani_services.navigator.avoidance.evaluation import CandidateEvaluation, evaluate_candidates
 from paani_services.navigator.avoidance.passages import find_passages
 from paani_services.navigator.avoidance.planner import judge_candidates
-from paani_services.navigator.avoidance.rollout import BoatState, GuidanceSetpoint, Plan, roll_out
+from paani_services.navigator.avoidance.rollout import BoatState, GuidanceSetpoint
 from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle
 from paani_services.navigator.mapping.occupancy_grid import OccupancyGrid, build_occupancy_grid
 from paani_services.navigator.mapping.velocity_fit import Velocity
 from paani_sim.eye.camera import BoatPose
-from tests.synthetic_water import CAMERA, PLANNER, START_US, observe_from, plan_on, request_on, water_edge_of
+from tests.kinematic_imazu import STEP_S, moved
+from tests.synthetic_water import (
+    CAMERA,
+    PLANNER,
+    START_US,
+    observe_from,
+    open_water,
+    plan_on,
+    request_on,
+    water_edge_of,
+)
 
 CRUISING, RESTING = BoatState(0.0, 0.0, 0.0, 0.6), BoatState(0.0, 0.0, 0.0)
 AHEAD = GuidanceSetpoint(0.0, 0.6)
 HALF_BEAM_M, LENGTH_M = 0.9, 13.0
-STEP_S = 0.4
-
-
-@functools.cache
-def open_water() -> OccupancyGrid:
-    return build_occupancy_grid(observe_from().observations, (0.0, 0.0), START_US, CAMERA, PLANNER)
+PLAN_S = 2 * STEP_S
 
 
 def vessel_from(
@@ -55,7 +59,7 @@ def evaluate(
 
 def gap_m(boat: BoatState, bow: DynamicObstacle) -> float:
     """From the boat's middle to the side of a vessel with this bow, of `LENGTH_M`."""
-    speed_mps = math.hypot(*bow.velocity[:2])
+    speed_mps = bow.velocity.speed_mps
     east, north = bow.velocity.east_mps / speed_mps, bow.velocity.north_mps / speed_mps
     x_m, y_m = boat.x_m - float(bow.east_m.mean()), boat.y_m - float(bow.north_m.mean())
     along_m, aside_m = x_m * east + y_m * north, abs(y_m * east - x_m * north)
@@ -63,10 +67,10 @@ def gap_m(boat: BoatState, bow: DynamicObstacle) -> float:
 
 
 def least_gap_m(start: BoatState, vessel: DynamicObstacle, for_s: float) -> float:
-    """The least `gap_m` of a boat that moves as the planner expects and is given a plan every `STEP_S`."""
+    """The least `gap_m` of a boat that moves as the planner expects and is given a plan every `PLAN_S`."""
     boat, previous, least_m = start, None, math.inf
-    for number in range(round(for_s / STEP_S)):
-        now_s = number * STEP_S
+    for number in range(round(for_s / PLAN_S)):
+        now_s = number * PLAN_S
         east_m, north_m = (
             at + now_s * by for at, by in zip((vessel.east_m, vessel.north_m), vessel.velocity[:2], strict=True)
         )
@@ -75,23 +79,8 @@ def least_gap_m(start: BoatState, vessel: DynamicObstacle, for_s: float) -> floa
         memory = observe_from(BoatPose(boat.x_m, boat.y_m, boat.yaw_rad))
         grid = build_occupancy_grid(memory.observations, (boat.x_m, boat.y_m), START_US, CAMERA, PLANNER)
         previous = plan_on(grid, boat, AHEAD, previous, PLANNER, (seen,))
-        boat = _moved(boat, previous)
+        boat = moved(moved(boat, previous, PLANNER), previous, PLANNER)
     return least_m
-
-
-def _moved(boat: BoatState, plan: Plan) -> BoatState:
-    """The boat `STEP_S` later, which is two steps of the planner's simulation."""
-    off_rad = math.remainder(plan.heading_rad - boat.yaw_rad, 2.0 * math.pi) if plan.speed_mps else 0.0
-    path = roll_out(boat, np.array([off_rad]), np.array([plan.speed_mps]), PLANNER)
-    x_m, y_m = path.x_m[:3, 0], path.y_m[:3, 0]
-    surge_mps = float(
-        np.clip(plan.speed_mps - boat.surge_mps, -PLANNER.accel_mps2 * STEP_S, PLANNER.accel_mps2 * STEP_S)
-    )
-    helm = float(np.clip(off_rad / 0.5, -1.0, 1.0)) * PLANNER.yaw_rate_radps
-    most_radps = PLANNER.yaw_accel_radps2 * STEP_S
-    rate_radps = boat.yaw_rate_radps + float(np.clip(helm - boat.yaw_rate_radps, -most_radps, most_radps))
-    yaw_rad = math.remainder(boat.yaw_rad + STEP_S * 0.5 * (rate_radps + boat.yaw_rate_radps), 2.0 * math.pi)
-    return BoatState(float(x_m[-1]), float(y_m[-1]), yaw_rad, boat.surge_mps + surge_mps, rate_radps)
 
 
 @pytest.mark.slow
@@ -116,13 +105,12 @@ def test_a_vessel_that_is_known_for_six_seconds_strikes_nobody(
 def test_a_boat_is_never_left_at_rest_before_what_runs_it_down(
     bearing_rad: float, speed_mps: float, in_s: float, aside_m: float, surge_mps: float
 ) -> None:
-    """In open water it goes, on a path that is no likelier to be met than that of any slower candidate there."""
+    """In open water it goes, on a path of which a blow is at most 0.35 more probable than on any other."""
     vessel = vessel_from(bearing_rad, speed_mps, in_s, aside_m=aside_m)
     start = RESTING._replace(surge_mps=surge_mps)
     judged = judge_candidates(request_on(open_water(), start, AHEAD, None, PLANNER, (vessel,)))
     assert judged is not None
-    if not judged.evaluation.runs_down.any():
-        return
+    assume(judged.evaluation.runs_down.any())
     assert judged.cheapest_plan().speed_mps > 0.0
     feasible = ~any_refusal(judged.refusals)
     chosen = int(np.where(feasible, judged.costs.total, np.inf).argmin())
@@ -162,9 +150,9 @@ def test_nobody_is_fled_from_into_what_stands_beside_the_boat(bearing_rad: float
     evaluation = evaluate(vessel_from(bearing_rad, 2.0, in_s), grid=grid)
     alone = evaluate_candidates(request_on(grid, RESTING, AHEAD, None, PLANNER))
     with_vessel, without = hard_constraints(evaluation), hard_constraints(alone)
-    if evaluation.runs_down.all():
-        assert all((with_vessel[name] == without[name]).all() for name in with_vessel)
-        assert (evaluation.static_clearance_m == alone.static_clearance_m).all()
+    assert evaluation.runs_down.all()
+    assert all((with_vessel[name] == without[name]).all() for name in with_vessel)
+    assert (evaluation.static_clearance_m == alone.static_clearance_m).all()
 
 
 def test_the_probability_of_a_blow_falls_with_the_distance_and_rises_with_what_is_unknown() -> None:
@@ -196,14 +184,17 @@ def test_a_blow_is_weighed_of_what_cannot_be_outrun(speed_mps: float, aside_m: f
 @pytest.mark.parametrize("label", [Label.VESSEL, Label.BUOY])
 def test_what_refuses_nothing_is_weighed(label: Label) -> None:
     """However fast it is, and however well that is known, an obstacle refuses candidates or costs them something."""
+    count = 0
     for speed_mps in np.linspace(0.3, 2.5, 12).tolist():
         for deviation_mps in (0.05, 0.2, 0.4, 0.8, 1.2):
             found = vessel_from(0.0, speed_mps, 5.0, label)
             found = found._replace(velocity=found.velocity._replace(deviation_mps=deviation_mps))
             evaluation = evaluate(found)
             if evaluation.runs_down.any():
+                count += 1
                 assert speed_mps - 2.0 * deviation_mps > UNDER_WAY_MPS[1]
                 assert find_passages(evaluation).collision.max() > 0.3
+    assert count > 10
 
 
 def test_the_gap_is_that_to_the_outline() -> None:
