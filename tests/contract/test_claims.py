@@ -24,6 +24,7 @@ def test_the_file_is_complete() -> None:
     assert sorted(CLAIMS) == sorted(IDS)
 
 
+@pytest.mark.slow
 def test_every_row_can_be_checked() -> None:
     """Tests that exist, mutants that fit in one place of one file and change its code."""
     assert find_faults(CLAIMS, ROOT) == []

@@ -28,6 +28,7 @@ def test_no_source_of_the_firmware_is_over_400_lines() -> None:
             assert len(path.read_text(encoding="utf-8").splitlines()) <= 400, path
 
 
+@pytest.mark.slow
 def test_the_core_has_no_undefined_symbols(tmp_path: Path) -> None:
     """No heap, no library, no exceptions: linked by itself, the core asks for nothing."""
     if not shutil.which("g++"):

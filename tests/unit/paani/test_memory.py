@@ -29,6 +29,7 @@ def make_tuples_of_what_is_iterated_over() -> None:
         del held
 
 
+@pytest.mark.slow
 def test_freed_tuples_are_given_back() -> None:
     recycle()
     before = sys.getallocatedblocks()

@@ -78,6 +78,7 @@ async def test_bytes_arrive_as_soon_as_they_are_there(device: Device, port: Port
     assert sorted(delays_ms)[25] < 10.0
 
 
+@pytest.mark.slow
 async def test_waiting_for_bytes_costs_no_cpu(port: Port) -> None:
     before_s = process_cpu_s()
     with pytest.raises(TimeoutError):
@@ -176,6 +177,7 @@ async def test_a_socket_is_a_port_too() -> None:
         await port.close()
 
 
+@pytest.mark.slow
 async def test_a_peer_that_sends_byte_by_byte_is_not_kept_waiting() -> None:
     """It sends on when what it sent is acknowledged, which Linux puts off by 40 ms once a connection is interactive."""
     with socket.socket() as listener:

@@ -214,6 +214,7 @@ def test_nothing_differs_in_the_shipped_detector(capsys: pytest.CaptureFixture[s
     assert "candidates" not in printed
 
 
+@pytest.mark.slow
 def test_a_detector_without_people_is_warned_of_and_refused_on_a_hull(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:

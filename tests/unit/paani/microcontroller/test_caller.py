@@ -174,6 +174,7 @@ async def test_a_change_of_state_is_heard_without_a_call_and_an_older_one_change
     assert heard == changes[:1]
 
 
+@pytest.mark.slow
 async def test_a_device_that_was_pulled_out_is_named_and_used_again_when_it_is_back(tmp_path: Path) -> None:
     peer = McuPeer()
     line = PtyLine(str(tmp_path / "tty"), peer)
@@ -210,6 +211,7 @@ async def test_a_line_that_breaks_during_a_call_ends_it_at_once() -> None:
             await asyncio.gather(caller.call("paani_guide", GUIDE), close())
 
 
+@pytest.mark.slow
 async def test_a_line_that_is_not_to_be_had_is_tried_again_without_haste() -> None:
     before_s = process_cpu_s()
     async with running(f"socket://127.0.0.1:{find_free_port()}") as caller:

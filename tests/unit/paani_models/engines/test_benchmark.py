@@ -115,6 +115,7 @@ def test_bench_reports_why_ncnn_is_excluded(tmp_path: Path, capsys: pytest.Captu
     assert "make it with: paani models convert" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_bench_runs_both_engines(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     segmenter = place(small_segmenter(tmp_path / "segmenter.onnx"), CONVOLUTION, packed())
     place(Path(shutil.copy(verified_path("detector"), tmp_path)), NO_BOXES, bytes(4 * 8 * 2730))

@@ -92,6 +92,7 @@ def require_exact(given_scene: Scene, config: Config) -> None:
 
 @settings(max_examples=250, deadline=None)
 @given(scenes(7), CONFIGS)
+@pytest.mark.slow
 def test_every_set_changes_the_direction_and_none_smaller_does(given_scene: Scene, config: Config) -> None:
     require_exact(given_scene, config)
 
@@ -99,6 +100,7 @@ def test_every_set_changes_the_direction_and_none_smaller_does(given_scene: Scen
 @pytest.mark.parametrize(
     ("seed", "tracks", "size"), [(17, 24, 1), (4, 24, 2), (0, 24, 3), (5, 24, 0), (1, 12, 3), (38, 12, 0)]
 )
+@pytest.mark.slow
 def test_the_sets_are_exact_in_crowded_scenes(seed: int, tracks: int, size: int) -> None:
     """Up to all 24 boxes of the detector, against every set of up to three; size 0: there is none so small."""
     require_exact(scene(seed, tracks), PAANI)

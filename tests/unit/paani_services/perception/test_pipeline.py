@@ -62,6 +62,7 @@ def test_c15_the_threshold_is_one_setting_and_travels() -> None:
     assert evidence.confidence_threshold == 0.25
 
 
+@pytest.mark.slow
 def test_concurrent_and_sequential_agree() -> None:
     """B4: the order of the models changes nothing they say."""
     one, _ = perceiver(PerceptionConfig(concurrent=True)).perceive(river(), HEADER, 0.0)
@@ -89,6 +90,7 @@ def test_b4_the_paper_runs_the_detector_and_then_the_segmenter(monkeypatch: pyte
 
 
 @pytest.mark.parametrize(("detector_ms", "begins"), [(30.0, "_detect"), (11.0, "_segment"), (5.0, "_segment")])
+@pytest.mark.slow
 def test_the_clearly_slower_network_starts_beside_the_image_quality_check(
     detector_ms: float, begins: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -135,6 +137,7 @@ def test_a_bad_picture_is_a_value(data: bytes, cause: m.UnusableCause) -> None:
     assert mask is None
 
 
+@pytest.mark.slow
 def test_age_is_judged_when_inference_starts() -> None:
     """J16: 0.8 s is still fresh, more is not looked at."""
     assert perceiver().perceive(river(), HEADER, 0.8)[0].usable
@@ -142,6 +145,7 @@ def test_age_is_judged_when_inference_starts() -> None:
     assert (old.usable, old.cause) == (False, m.UnusableCause.STALE)
 
 
+@pytest.mark.slow
 def test_a_frozen_camera() -> None:
     eyes = perceiver()
     data = jpeg(river())
@@ -210,6 +214,7 @@ def test_j19_the_paper_profile_accepts_black() -> None:
     assert not paper.concurrent
 
 
+@pytest.mark.slow
 def test_refused_pictures_leave_at_most_one_run_under_way(monkeypatch: pytest.MonkeyPatch) -> None:
     """However fast pictures are refused, at most one run that started beside the check is under way."""
     eyes, begun = perceiver(), []

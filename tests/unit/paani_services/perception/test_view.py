@@ -146,6 +146,7 @@ def test_a_doubted_picture_without_a_swimmer_stays_refused_and_one_that_repeats_
     assert causes == [UNFIT, UNFIT, UnusableCause.FROZEN, UnusableCause.FROZEN]
 
 
+@pytest.mark.slow
 def test_a_picture_is_filled_only_where_the_one_before_was() -> None:
     """A pontoon fills a fit picture, and then one that is unfit; beside a camera that breaks from one to the next."""
     hull, river_view = read_picture("pontoon"), read_picture("clear_water")
@@ -160,6 +161,7 @@ def test_a_picture_is_filled_only_where_the_one_before_was() -> None:
 
 
 @pytest.mark.parametrize("asks", [True, False])
+@pytest.mark.slow
 def test_a_doubted_picture_is_looked_at_for_people_and_no_other_unusable_one_is(asks: bool) -> None:
     """A detector's person is a candidate of it, the vessel beside is none; whoever asks for none is told of none."""
     looks = msgspec.structs.replace(CONFIG, candidates=msgspec.structs.replace(CONFIG.candidates, use=asks))

@@ -81,6 +81,7 @@ def test_parts_follow_one_another_without_a_gap(tmp_path: Path) -> None:
     assert counted(recording) == (100, 0)
 
 
+@pytest.mark.slow
 def test_a_part_ends_when_it_is_large(tmp_path: Path) -> None:
     recording = Recording(settings(tmp_path, part_mib=0.06, flush_s=0.1), describe_system(Config()), TOPICS)
     record(recording, range(1500))

@@ -125,6 +125,7 @@ def test_boat_inside_a_solid_is_thrown_out_not_to_infinity(open_plant: OpenPlant
         assert max(map(abs, plant.velocity)) < 5.0, obstacle.id
 
 
+@pytest.mark.slow
 def test_same_seed_same_bits(open_plant: OpenPlant) -> None:
     """1000 steps in one process, with a second plant alive: the force hook keeps them apart."""
 

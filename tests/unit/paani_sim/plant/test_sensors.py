@@ -25,6 +25,7 @@ def gps_errors_m(count: int, seed: int) -> list[float]:
     return found
 
 
+@pytest.mark.slow
 def test_k9_gps_error_wanders() -> None:
     """Neighbouring fixes share their error; over many minutes it has the stated spread."""
     found = gps_errors_m(60_000, seed=3)
@@ -50,6 +51,7 @@ def test_l5_speed_is_not_zero_at_rest() -> None:
     assert fix.sog_mps > 0.0
 
 
+@pytest.mark.slow
 def test_imu_bias_is_constant_and_noise_is_not() -> None:
     rng = np.random.default_rng(2)
     errors = initial_errors(CONFIG, rng)

@@ -31,6 +31,7 @@ def test_a_sweep_drives_every_case_at_every_value_and_none_with_a_fault() -> Non
     assert all(parse_case(case.name) == case for case in cases)
 
 
+@pytest.mark.slow
 def test_only_the_condition_of_a_world_changes() -> None:
     plain = build_scenario(TrialCase("river", 3, Policy.BLIND))
     for name, condition in CONDITIONS.items():
@@ -67,6 +68,7 @@ def test_more_people_are_met_where_the_sweep_says_so(world: str) -> None:
     assert many[True] / many.total() > 1.3 * plain[True] / plain.total()
 
 
+@pytest.mark.slow
 def test_as_many_encounters_are_met_as_the_sweep_says() -> None:
     def met(seed: int, wanted: int) -> set[str]:
         world = build_scenario(TrialCase("lake", seed, Policy.BLIND, swept=f"encounters={wanted}")).world

@@ -15,6 +15,7 @@ from paani_sim.worlds.plan_view import KINDS, LAND, ROUTE, WATER, draw_plan_view
 from paani_sim.worlds.world import Kind
 
 
+@pytest.mark.slow
 def test_list_names_every_world_and_scenario(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["list"]) == 0
     lines = capsys.readouterr().out.splitlines()

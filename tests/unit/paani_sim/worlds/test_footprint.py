@@ -30,6 +30,7 @@ def _beyond_m(outline: F64, points: F64) -> F64:
 
 
 @pytest.mark.parametrize("look", [*sorted(BOWS), "eight"])
+@pytest.mark.slow
 def test_the_drawn_boat_lies_within_its_outline_and_fills_it(look: str) -> None:
     vessel = _vessel(look)
     outline = build_outline(vessel)

@@ -126,6 +126,7 @@ def test_nothing_but_the_names_of_its_fields_keeps_an_order_of_another_version_o
     assert Admission(keys.THRUST, 43, 1.0).judge(msgspec.json.encode(fields), NOW_US) == (order, "")
 
 
+@pytest.mark.slow
 def test_an_expired_certificate_takes_the_place_of_one_and_gives_it_back(tmp_path: Path) -> None:
     certificates = Certificates(tmp_path)
     certificates.make()

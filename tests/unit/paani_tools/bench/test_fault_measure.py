@@ -139,6 +139,7 @@ class SlowLoop(Loop):
         self.armings += 1
 
 
+@pytest.mark.slow
 async def test_a_drive_that_is_slow_to_come_back_has_not_armed_itself(monkeypatch: pytest.MonkeyPatch) -> None:
     """It was armed all the time: the time counts from the fault's end, and no hand is said to have helped."""
     monkeypatch.setattr(measuring, "BACK_S", 0.2)

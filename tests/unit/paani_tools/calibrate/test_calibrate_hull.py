@@ -119,6 +119,7 @@ def test_a_drive_that_does_not_excite_a_parameter_says_so_and_writes_nothing(
     assert not out.exists()
 
 
+@pytest.mark.slow
 def test_the_thrust_in_a_step_is_its_mean_and_changes_when_the_plant_says(rich: Messages) -> None:
     """A change between two messages lies where `since_us` says: 20 ms into a step is 60 % of it at the new thrust."""
     applied = [msgspec.structs.replace(each, left=0.0, right=0.0) for each in rich.applied]

@@ -72,6 +72,7 @@ def test_every_identity_has_a_private_key_and_nobody_else_may_read_it(tmp_path: 
     assert require_certificates(bus, names[1:]).graph is graph
 
 
+@pytest.mark.slow
 def test_an_independent_program_verifies_what_was_signed(folder: Path) -> None:
     """A listener at the addresses that were given; a client cannot pass for one."""
     base = ["openssl", "verify", "-x509_strict", "-CAfile", str(folder / "authority.1.pem")]
@@ -181,6 +182,7 @@ def test_a_folder_is_made_whole_or_not_at_all(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("shift_days", "says"), [(-40, "expired 20"), (+40, "not valid before 20")])
+@pytest.mark.slow
 def test_out_of_date_is_told_with_file_and_date(tmp_path: Path, shift_days: int, says: str) -> None:
     folder = made(tmp_path, now_us=NOW_US + shift_days * DAY_US)
     certificates.rotate(folder, "all", NOW_US, 30)

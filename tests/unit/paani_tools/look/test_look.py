@@ -32,6 +32,7 @@ def lines(capsys: pytest.CaptureFixture[str]) -> dict[str, dict[str, object]]:
     return {Path(line["path"]).stem: line for line in found}
 
 
+@pytest.mark.slow
 def test_json_lines(folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     """U8, J19: black, white and noise each STOP / UNUSABLE_IMAGE; exactly the fields scripts rely on; no pictures."""
     monkeypatch.chdir(folder.parent)
@@ -53,6 +54,7 @@ def test_json_lines(folder: Path, capsys: pytest.CaptureFixture[str], monkeypatc
     assert [p.name for p in folder.parent.iterdir()] == ["pictures"]
 
 
+@pytest.mark.slow
 def test_readable_lines_and_annotated_pictures(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -86,6 +88,7 @@ def test_a_spoilt_picture_among_others_is_reported(folder: Path, capsys: pytest.
     assert lines(capsys)["aaa"]["cause"] == "undecodable"
 
 
+@pytest.mark.slow
 def test_stills_do_not_know_of_each_other(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Ten equal stills: none is called frozen, all get the same advice."""
     for i in range(10):

@@ -139,6 +139,7 @@ def test_outside_nothing_moves_unless_fence_return_is_set() -> None:
 @example(yaw_deg=53.0, x_m=4.0, y_m=14.0, advice=[Direction.LEFT, Direction.LEFT, Direction.STRAIGHT])
 @example(yaw_deg=-121.0, x_m=16.0, y_m=12.75, advice=[Direction.LEFT, Direction.RIGHT])  # close by a corner, turning
 @settings(max_examples=8, deadline=None)
+@pytest.mark.slow
 def test_no_advice_carries_the_boat_over_the_edge(
     yaw_deg: float, x_m: float, y_m: float, advice: list[Direction]
 ) -> None:

@@ -187,6 +187,7 @@ def test_an_obstacle_whose_edge_moves_by_a_cell_is_not_outvoted() -> None:
         assert cell(grid_of(memory), 5.0, 0.0) == cell(grid_of(memory), 5.4, 0.0) == "occupied"
 
 
+@pytest.mark.slow
 def test_cells_out_of_sight_stay_occupied_longer() -> None:
     """A boat that turned away remembers a bar for `hidden_s`; the paper's lifetimes forget it."""
     memory = observe_from(edge=water_edge_of(AT_REST, AHEAD_5_M))
