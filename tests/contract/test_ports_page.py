@@ -47,6 +47,7 @@ def test_the_table_has_a_column_for_each_port_and_each_has_its_page() -> None:
 
 
 @pytest.mark.parametrize("port", PORTS)
+@pytest.mark.slow
 def test_every_name_is_one_that_the_port_has(port: str) -> None:
     names = columns()[port]
     assert names

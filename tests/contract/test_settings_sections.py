@@ -58,6 +58,7 @@ def test_a_service_reads_its_own_section_and_shared_ones(service: str) -> None:
     assert others == {section for reader, section in KNOWN if reader == service}
 
 
+@pytest.mark.slow
 def test_the_sections_are_found() -> None:
     """The search sees what services read of their own."""
     own = {service for service in SECTIONS if (SERVICES / service).is_dir()}

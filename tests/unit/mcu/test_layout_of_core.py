@@ -70,6 +70,7 @@ def test_a4_the_microcontroller_serves_four_calls_and_no_other() -> None:
     assert set(provided) == set(served)
 
 
+@pytest.mark.slow
 def test_static_analysis_finds_nothing() -> None:
     if not shutil.which("cppcheck"):
         pytest.skip("needs cppcheck")

@@ -70,6 +70,7 @@ def test_30_000_random_frames_across_the_wrap_and_no_motion_past_its_lease(part:
     assert driven > 500
 
 
+@pytest.mark.slow
 def test_20_000_damaged_frames_and_none_acted_on(core: Core) -> None:
     """Between good frames, which all arrive. What a damaged one would show differs from what every good one does."""
     rng = random.Random(1)
@@ -202,6 +203,7 @@ def scenario(script: Script | RecordedSession) -> None:
         script.wait(rng.randrange(1, 700 if rng.random() < 0.1 else 60))
 
 
+@pytest.mark.slow
 def test_addresses_are_watched_and_both_builds_say_the_same() -> None:
     """The program under AddressSanitizer plays what the library lives through, and sends the same bytes."""
     script = Script()

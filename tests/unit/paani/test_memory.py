@@ -40,6 +40,7 @@ def test_freed_tuples_are_given_back() -> None:
     assert sys.getallocatedblocks() - before < kept / 10
 
 
+@pytest.mark.slow
 def test_what_is_loaded_is_no_part_of_a_collection() -> None:
     loaded = len(gc.get_objects())
     set_loaded_apart()
@@ -47,6 +48,7 @@ def test_what_is_loaded_is_no_part_of_a_collection() -> None:
 
 
 @pytest.mark.skipif(memory._TRIM is None, reason="only glibc keeps gaps and can give them back")
+@pytest.mark.slow
 def test_gaps_between_what_is_in_use_are_given_back() -> None:
     blocks = [bytearray(b"x" * BLOCK_BYTES) for _ in range(BLOCKS)]
     between = blocks[::16]

@@ -87,6 +87,7 @@ async def test_waiting_for_bytes_costs_no_cpu(port: Port) -> None:
     assert process_cpu_s() - before_s < 0.1
 
 
+@pytest.mark.slow
 async def test_a_device_pulled_out_ends_reading_and_writing_in_one_line(device: Device, port: Port) -> None:
     device.send(b"last")
     await asyncio.sleep(0.05)
@@ -117,6 +118,7 @@ async def test_a_device_has_one_user(device: Device, port: Port) -> None:
         await open_port(device.address)
 
 
+@pytest.mark.slow
 async def test_a_babbling_device_fills_a_bounded_queue_and_costs_no_cpu_unless_it_is_read(
     device: Device, port: Port
 ) -> None:

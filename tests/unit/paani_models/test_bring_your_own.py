@@ -207,6 +207,7 @@ def test_what_differs_in_a_detector_is_named(tmp_path: Path, capsys: pytest.Capt
     assert "2100 candidates, strides 8, 16, 32 of 416x320 pixels give 2730" in printed
 
 
+@pytest.mark.slow
 def test_nothing_differs_in_the_shipped_detector(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["models", "check", str(verified_path("detector"))]) == 0
     printed = capsys.readouterr().out
@@ -238,6 +239,7 @@ def test_a_detector_without_people_is_warned_of_and_refused_on_a_hull(
         assert ("people are not seen" in caplog.text) == warned
 
 
+@pytest.mark.slow
 def test_a_copy_of_the_shipped_model_scores_as_shipped(tmp_path: Path) -> None:
     shutil.copy(verified_path("segmenter"), tmp_path / "copy.onnx")
     own = Perceiver(PerceptionConfig(segmenter=str(tmp_path / "copy.onnx")), stopwatch_ms)

@@ -144,6 +144,7 @@ def test_nothing_to_see_is_never_water_v15(kind: str) -> None:
     assert (label == WATER).mean() < 0.02
 
 
+@pytest.mark.slow
 def test_null_pictures_hold_no_object_above_the_boards_threshold_c6() -> None:
     net = open_detector(verified_path("detector"), threads=1)
     top = max(

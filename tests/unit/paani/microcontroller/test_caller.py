@@ -128,6 +128,7 @@ async def test_one_call_is_outstanding_at_a_time() -> None:
     assert [call.id for call in peer.calls if isinstance(call, Request)] == [1, 2, 3, 4]
 
 
+@pytest.mark.slow
 async def test_an_answer_that_comes_late_answers_no_other_call() -> None:
     peer = McuPeer()
     held: list[bytes] = []
@@ -157,6 +158,7 @@ async def test_on_a_bare_line_the_microcontroller_is_answered_as_the_router_woul
     assert peer.responses == [Response(1, "", 0, True), Response(2, "", 0, True)]
 
 
+@pytest.mark.slow
 async def test_a_change_of_state_is_heard_without_a_call_and_an_older_one_changes_nothing() -> None:
     peer = McuPeer()
     changes = [

@@ -63,6 +63,7 @@ def test_a_place_seen_again_is_one_sequence(tmp_path: Path) -> None:
     assert manifest.items[6].seq == manifest.items[0].seq != manifest.items[3].seq
 
 
+@pytest.mark.slow
 def test_the_image_split_lets_neighbours_leak_r11(tmp_path: Path) -> None:
     """Ten still scenes of four frames: single frames are held out, so nearly each has its twin in training."""
     raw = mastr1325(tmp_path / "raw", (4,) * 10)

@@ -98,6 +98,7 @@ def test_rows_are_least_median_and_p95() -> None:
     )
 
 
+@pytest.mark.slow
 def test_bench_reports_why_ncnn_is_excluded(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     weights = Path(shutil.copytree(WEIGHTS, tmp_path / "weights", ignore=shutil.ignore_patterns("*.ncnn.*")))
     words = ["bench", "--weights", str(weights), "--threads", "1", "--rounds", "1"]

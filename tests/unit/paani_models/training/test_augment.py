@@ -87,6 +87,7 @@ def test_the_papers_augmentation_has_its_shares_s8() -> None:
 
 
 @pytest.mark.parametrize("left_out", AUGMENTATIONS)
+@pytest.mark.slow
 def test_each_of_the_papers_augmentations_may_be_left_out_alone(left_out: str) -> None:
     """And nothing is left of a picture's change without all three."""
     picture, mask = np.full((256, 320, 3), 90, np.uint8), np.zeros((256, 320), np.uint8)
@@ -137,6 +138,7 @@ def test_mask_follows_the_picture() -> None:
         assert agree[known].mean() > 0.98
 
 
+@pytest.mark.slow
 def test_null_pictures_are_all_obstacle_and_of_many_kinds() -> None:
     pictures = []
     for seed in range(60):

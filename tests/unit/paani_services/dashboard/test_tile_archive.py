@@ -48,6 +48,7 @@ def test_a_tile_of_each_kind_is_served(tmp_path: Path, kind: str, suffix: str) -
         assert read_tile(path, zoom, column, row) is None
 
 
+@pytest.mark.slow
 def test_directories_below_the_first_are_followed_and_a_new_file_is_read_anew(tmp_path: Path) -> None:
     tiles = {(9, number // 512, number % 512): PICTURES["png"] + b"%d" % number for number in range(MANY)}
     path = written(tmp_path / "chart.pmtiles", tiles)

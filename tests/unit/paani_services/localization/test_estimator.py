@@ -24,6 +24,7 @@ def boat() -> EstimatedBoat:
     return boat
 
 
+@pytest.mark.slow
 def test_l2_l3_follows_the_boat_in_the_map(boat: EstimatedBoat) -> None:
     """L2, L3: position in the ENU map, heading and speed, along a curve."""
     boat.sail(40.0, surge_mps=0.5, yaw_rate_radps=0.05)
@@ -146,6 +147,7 @@ def test_the_gyro_bias_is_not_taken_from_a_boat_that_turns() -> None:
     assert estimate_gyro_bias(resting).radps == pytest.approx(BIAS_RADPS, abs=5e-4)
 
 
+@pytest.mark.slow
 def test_a12_without_heading_there_is_no_health() -> None:
     """A12: an IMU that marks its orientation unavailable gives no yaw to steer by."""
     boat = EstimatedBoat()

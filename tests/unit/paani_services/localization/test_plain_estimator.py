@@ -32,6 +32,7 @@ def boat() -> EstimatedBoat:
     return boat
 
 
+@pytest.mark.slow
 def test_l3_position_of_gps_and_heading_of_the_imu(boat: EstimatedBoat) -> None:
     """L3: along a curve; the speed is that of the fixes' positions, for none is measured."""
     boat.sail(40.0, surge_mps=0.5, yaw_rate_radps=0.05)
@@ -73,6 +74,7 @@ def test_a_receiver_that_jumps_is_followed_and_believed(boat: EstimatedBoat) -> 
     assert not ours.global_estimate.healthy
 
 
+@pytest.mark.slow
 def test_l5_a_boat_at_rest_seems_to_move_as_its_receivers_error_does() -> None:
     """L5: with the simulator's receiver, where the augmented filter finds rest."""
     moving = []

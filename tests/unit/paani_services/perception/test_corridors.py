@@ -36,6 +36,7 @@ def test_e1_softmax() -> None:
     assert classify_cells(logits, 2.0)[1] == pytest.approx(math.e / (math.e + math.e**0.5 + 1.0), abs=1e-6)
 
 
+@pytest.mark.slow
 def test_d4_one_pixel_per_cell_represents_the_upscaled_output() -> None:
     """D4: the paper's last step is a nearest resize by four, so argmax and confidence repeat exactly."""
     small = np.random.default_rng(0).normal(size=(1, 3, 64, 80)).astype(np.float32)

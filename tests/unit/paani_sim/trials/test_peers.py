@@ -134,6 +134,7 @@ def test_times_to_collision_by_hand() -> None:
     assert time_to_points_s(np.array([[1.0, 0.0]]), velocities).tolist() == [0.0, math.inf, math.inf, math.inf]
 
 
+@pytest.mark.slow
 def test_a_peer_steers_in_the_place_of_the_navigators_planner() -> None:
     """It is given map, tracks and course, its order is the navigator's, and no order comes before arming."""
     given: list[PlanningInputs] = []

@@ -74,6 +74,7 @@ class OneProcess(Loop):
         return self._pid
 
 
+@pytest.mark.slow
 async def test_a_process_refused_memory_is_followed_until_it_has_spoken_long_after() -> None:
     fault = next(fault for fault in faults_of(Drive.PLAIN) if fault.name == "advisor refused memory")
     process = await asyncio.create_subprocess_exec("cat", stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE)

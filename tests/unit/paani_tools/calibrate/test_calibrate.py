@@ -58,6 +58,7 @@ def recording(folder: Path, pairs: Iterator[Pair]) -> Path:
 
 
 @pytest.mark.parametrize(("roll_deg", "pitch_deg"), [(0.0, 0.0), (3.0, -2.5), (-5.0, 4.0)])
+@pytest.mark.slow
 def test_the_mount_is_found_to_a_tenth_of_a_degree(roll_deg: float, pitch_deg: float) -> None:
     pairs = list(drawn(60, math.radians(roll_deg), math.radians(pitch_deg)))
     config = load_config(sets=KNOWN[1::2]).calibration

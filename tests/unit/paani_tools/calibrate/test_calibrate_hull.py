@@ -192,6 +192,7 @@ def test_a_mistake_is_told_in_one_line(
     assert expected in capsys.readouterr().err.splitlines()[-1]
 
 
+@pytest.mark.slow
 def test_twenty_seconds_are_too_few(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = record(tmp_path, drive("paper", SHORT, seed=1))
     assert paani(["calibrate", "hull", str(file), "--vessel", "paper"]) == 2

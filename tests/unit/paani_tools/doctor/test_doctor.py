@@ -73,6 +73,7 @@ def test_a_folder_that_takes_no_files_is_told_and_not_made() -> None:
     assert only(examine("permissions", ("bus.runtime_dir=/proc/paani",))).state is State.OK
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_told_before_the_logs_fill_it(tmp_path: Path) -> None:
     if subprocess.run([*IN_NAMESPACE, "true"], capture_output=True, check=False).returncode:
         pytest.skip("no mount namespace of one's own here (unshare)")

@@ -101,6 +101,7 @@ def test_the_order_tells_the_encounter_that_it_is_for(log: Path) -> None:
     assert "nearest in" not in narrative_of(msgspec.structs.replace(moment, prediction=None), CONFIG)
 
 
+@pytest.mark.slow
 def test_headings_that_were_not_taken_are_told_with_why(log: Path) -> None:
     """From port to starboard, neighbours alike together; the costs of the cheapest by name."""
     wall, free = m.Constraint.STATIC_OBSTACLE, m.Constraint.NONE

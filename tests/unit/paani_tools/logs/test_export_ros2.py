@@ -99,6 +99,7 @@ def test_values_are_those_of_the_recording(tmp_path: Path, capsys: pytest.Captur
     assert [at_us for at_us, _ in found["/diagnostics"]] == [START_US, START_US + 1_000_000, START_US + 2_000_000]
 
 
+@pytest.mark.slow
 def test_frames_and_names_are_those_of_the_recorded_boat(tmp_path: Path) -> None:
     config = load_config(sets=(
         "bus.vessel=beaver", "ros2.frame_prefix=beaver/",   "calibration.hfov_deg=70",

@@ -82,6 +82,7 @@ def test_the_paper_goes_on_in_the_dark(folder: Path, capsys: pytest.CaptureFixtu
     assert lines(capsys)["black"]["usable"] is True
 
 
+@pytest.mark.slow
 def test_a_spoilt_picture_among_others_is_reported(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (folder / "aaa.jpg").write_bytes(b"spoilt")
     assert main([str(folder), "--json"]) == 0
@@ -100,6 +101,7 @@ def test_stills_do_not_know_of_each_other(tmp_path: Path, capsys: pytest.Capture
     assert found[0]["usable"] is True
 
 
+@pytest.mark.slow
 def test_a_video_is_one_sequence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A film of one and the same picture is a frozen camera from its third frame on."""
     path = tmp_path / "still.avi"
@@ -167,6 +169,7 @@ def test_an_explanation_is_wrapped_by_its_drawn_width() -> None:
     assert wrap_text("", 0.6, 400) == []
 
 
+@pytest.mark.slow
 def test_a_sheet_shows_the_folder_in_one_picture(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     sheet = tmp_path / "sheet.png"

@@ -53,6 +53,7 @@ async def test_thrust_needs_an_address(profile: str, private_sets: tuple[str, ..
         await make_plan(load_config(profile=profile, sets=(*sets, *sensors)))
 
 
+@pytest.mark.slow
 async def test_hardware_in_the_loop_needs_the_pulses(private_sets: tuple[str, ...]) -> None:
     sets = (*private_sets, "dashboard.serve=false", "thrusters.line=socket://127.0.0.1:5001")
     with pytest.raises(UserError, match=r"plant\.pwm_line: not set"):

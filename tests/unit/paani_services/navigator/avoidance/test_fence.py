@@ -154,6 +154,7 @@ def test_no_advice_carries_the_boat_over_the_edge(
             assert is_allowed(FENCE, boat.position_m)
 
 
+@pytest.mark.slow
 def test_the_boat_stops_before_the_edge_and_says_why() -> None:
     mission = msgspec.structs.replace(mission_of_route(straight_to((5, 4), (80, 4))), fence=FENCE)
     boat = DriftingBoat(mission, PAANI, (5.0, 4.0))

@@ -190,6 +190,7 @@ def test_what_counts_is_how_sure_the_velocity_is_across_the_line_of_sight() -> N
 )
 @example(banks=(1.06, 1.57), place=(7.4, -0.19), velocity=(-0.73, -0.19))
 @example(banks=(1.8, 0.97), place=(7.1, -1.71), velocity=(-0.48, 0.53))
+@pytest.mark.slow
 def test_courtesy_never_leads_further_into_the_margin(
     banks: tuple[float, float], place: tuple[float, float], velocity: tuple[float, float]
 ) -> None:

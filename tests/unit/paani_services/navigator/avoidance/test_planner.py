@@ -222,6 +222,7 @@ def test_a_boat_beside_a_hull_moves_away_before_it_turns_to_its_course(side: flo
     surge=st.floats(0.0, 0.6),
     course=st.floats(-3.1, 3.1),
 )
+@pytest.mark.slow
 def test_no_plan_leads_over_a_person(ahead_m: float, left_m: float, gone_m: float, surge: float, course: float) -> None:
     """A boat within the room around a swimmer keeps hull and Q6's margin all the same."""
     corners = np.array([[ahead_m, left_m - 0.3, 0.0], [ahead_m, left_m + 0.3, 0.0]])

@@ -114,6 +114,7 @@ def test_land_is_known_beside_a_fence_and_without_anything_to_do(tmp_path: Path)
     assert (route_to_show, nothing.legs, nothing.land) == (None, (), mission.land)
 
 
+@pytest.mark.slow
 def test_fence_and_land_share_their_corners(tmp_path: Path) -> None:
     """Each is tested at every step of the navigator."""
     arc = [(0.1 * n, 30.0 + 0.001 * n * n) for n in range(998)]

@@ -105,6 +105,7 @@ def test_a_vessel_adrift_is_told_from_a_moored_one_in_8_s(velocity: tuple[float,
     past_m=st.floats(1.9, 2.4),
     side=st.sampled_from([-1.0, 1.0]),
 )
+@pytest.mark.slow
 def test_a_vessel_that_the_picture_s_side_cuts_is_not_taken_for_moored(
     speed_mps: float, past_m: float, side: float
 ) -> None:

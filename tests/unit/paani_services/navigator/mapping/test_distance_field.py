@@ -14,6 +14,7 @@ from paani_services.navigator.mapping.occupancy_grid import GRID_CELLS
 
 @settings(max_examples=10, deadline=None)
 @given(cells=st.lists(st.tuples(st.integers(0, 99), st.integers(0, 99)), max_size=12))
+@pytest.mark.slow
 def test_distances_are_those_to_the_nearest_cell(cells: list[tuple[int, int]]) -> None:
     mask = np.zeros((GRID_CELLS, GRID_CELLS), np.bool_)
     for row, column in cells:
