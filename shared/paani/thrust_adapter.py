@@ -133,12 +133,35 @@ class ThrustAdapter:
         return ZeroCause.NONE
 
 
-def applied_message(adapter: ThrustAdapter, applied: AppliedThrust, source_us: int, since_us: int) -> ThrustApplied:
+class InForce:
+    """Since when what is applied has been applied.
+
+    `command`: the one in force; None while thrust is zero for a cause. `since_us`: since when it is, or none.
+    `zero_since_us`: since when no fan has thrust, whatever the cause; 0 while one has.
+    """
+
+    def __init__(self) -> None:
+        self.command: Thrust | None = None
+        self.since_us = self.zero_since_us = 0
+
+    def advance(self, applied: AppliedThrust, newest: Thrust | None, now_us: int) -> None:
+        """Take what is applied from now on. newest: the newest command accepted."""
+        command = newest if applied.zero_cause is ZeroCause.NONE else None
+        if command is not self.command or self.since_us == 0:
+            self.command, self.since_us = command, now_us
+        if applied.left_n != 0.0 or applied.right_n != 0.0:
+            self.zero_since_us = 0
+        elif self.zero_since_us == 0:
+            self.zero_since_us = now_us
+
+
+def applied_message(adapter: ThrustAdapter, applied: AppliedThrust, source_us: int, in_force: InForce) -> ThrustApplied:
     """The thrust that the adapter applies, and the command behind it."""
     command = adapter.command
     return ThrustApplied(
         source_us=source_us,
-        since_us=since_us,
+        since_us=in_force.since_us,
+        zero_since_us=in_force.zero_since_us,
         **applied._asdict(),
         rejected=adapter.rejected,
         command_seq=command.seq if command else 0,

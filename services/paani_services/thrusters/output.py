@@ -67,19 +67,15 @@ def find_output_cause(status: McuStatus | None, age_ms: float, lease_ms: float) 
 
 
 class ReportSchedule:
-    """When what is applied is due on the bus, and since when it is applied."""
+    """When what is applied is due on the bus."""
 
-    def __init__(self, period_ms: float, now_us: int, now_ms: float) -> None:
-        self._period_ms, self._due_ms, self.since_us = period_ms, now_ms, now_us
+    def __init__(self, period_ms: float, now_ms: float) -> None:
+        self._period_ms, self._due_ms = period_ms, now_ms
         self._cause = m.ZeroCause.NO_COMMAND
-        self._in_force: m.Thrust | None = None
         self.count = 0
 
-    def advance(self, cause: m.ZeroCause, command: m.Thrust | None, now_us: int, now_ms: float) -> tuple[bool, bool]:
+    def advance(self, cause: m.ZeroCause, now_ms: float) -> tuple[bool, bool]:
         """Whether a report is due, and whether the cause of a zero is another than before."""
-        command = command if cause is m.ZeroCause.NONE else None
-        if command is not self._in_force:
-            self._in_force, self.since_us = command, now_us
         is_due, has_changed = now_ms >= self._due_ms, cause is not self._cause
         self._cause = cause
         if is_due:

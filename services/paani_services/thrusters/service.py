@@ -14,7 +14,7 @@ from paani.bus import Bus
 from paani.clock import Clock, MonotonicClock, stopwatch_ms
 from paani.config import Config
 from paani.errors import UserError
-from paani.thrust_adapter import AppliedThrust, ThrustAdapter, applied_message
+from paani.thrust_adapter import AppliedThrust, InForce, ThrustAdapter, applied_message
 from paani_services.thrusters.autopilot_output import AutopilotOutput
 from paani_services.thrusters.esc_output import EscOutput
 from paani_services.thrusters.output import ReportSchedule
@@ -97,16 +97,17 @@ class Thrusters:
 
     async def report(self) -> None:
         """The clock that orders echo, what is applied, and the state; at once where the cause of a zero changes."""
-        schedule = ReportSchedule(1000.0 / keys.SIM_TIME.rate_hz, self._clock.now_us(), stopwatch_ms())
+        schedule, in_force = ReportSchedule(1000.0 / keys.SIM_TIME.rate_hz, stopwatch_ms()), InForce()
         while True:
             now_us, now_ms = self._clock.now_us(), stopwatch_ms()
             applied = self._output.applied(self._decide(), now_ms)
-            is_due, has_changed = schedule.advance(applied.zero_cause, self._adapter.command, now_us, now_ms)
+            in_force.advance(applied, self._adapter.command, now_us)
+            is_due, has_changed = schedule.advance(applied.zero_cause, now_ms)
             if is_due:
                 stamp_us = self._monotonic.now_us()
                 self._time.put(m.SimTime(source_us=now_us, sim_us=stamp_us, stamp_us=stamp_us))
             if is_due or has_changed:
-                self._applied.put(applied_message(self._adapter, applied, now_us, schedule.since_us))
+                self._applied.put(applied_message(self._adapter, applied, now_us, in_force))
             if has_changed or (is_due and schedule.count % STATE_EVERY == 0):
                 state = self._output.state(applied.zero_cause, now_us, now_ms)
                 self._state.put(state)

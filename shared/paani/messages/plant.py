@@ -90,7 +90,8 @@ class ThrustApplied(Message, frozen=True, kw_only=True):
     `left` and `right`: normalised, negative astern; `left_n` and `right_n`: the same in newtons. `command_seq`,
     `command_sent_us` and `command_source_us` are those of the newest thrust message accepted. `rejected`: thrust
     messages refused so far. `lost_pulse`: the process whose pulse is missing. `since_us`: since when the present
-    thrust, or zero, is applied.
+    command, or zero for a cause, is applied. `zero_since_us`: since when no fan has thrust, commanded or for whatever
+    cause; 0 while one has.
     """
 
     left: Signed
@@ -104,6 +105,7 @@ class ThrustApplied(Message, frozen=True, kw_only=True):
     rejected: Count = 0
     lost_pulse: Text = ""
     since_us: Stamp = 0
+    zero_since_us: Stamp = 0
 
 
 class TruePose(Message, frozen=True, kw_only=True):

@@ -12,7 +12,7 @@ from paani.bus import Bus
 from paani.clock import Clock, MonotonicClock
 from paani.config import Config
 from paani.errors import UserError
-from paani.thrust_adapter import AppliedThrust, ThrustAdapter, applied_message
+from paani.thrust_adapter import AppliedThrust, InForce, ThrustAdapter, applied_message
 from paani_sim.plant.plant import Plant
 from paani_sim.plant.pwm import PulseInput
 from paani_sim.plant.telemetry import Measurements, report_every
@@ -133,8 +133,7 @@ class _AppliedThrust:
         self._time, self._applied = bus.publisher(keys.SIM_TIME), bus.publisher(keys.THRUST_APPLIED)
         self._every = report_every(config.plant)
         self._last_cause = m.ZeroCause.NO_COMMAND
-        self._in_force: m.Thrust | None = None
-        self._since_us = 0
+        self._in_force = InForce()
 
     def publish(self, plant: Plant, adapter: ThrustAdapter, applied: AppliedThrust, source_us: int) -> None:
         """`source_us` dates the step that was just made. The clock is for the board alone."""
@@ -142,9 +141,7 @@ class _AppliedThrust:
         if is_due and self._link.is_up():
             stamp_us = self._monotonic.now_us()
             self._time.put(m.SimTime(source_us=source_us, sim_us=plant.sim_us, stamp_us=stamp_us))
-        in_force = adapter.command if applied.zero_cause is m.ZeroCause.NONE else None
-        if in_force is not self._in_force or self._since_us == 0:
-            self._in_force, self._since_us = in_force, source_us
+        self._in_force.advance(applied, adapter.command, source_us)
         if is_due or applied.zero_cause is not self._last_cause:
-            self._applied.put(applied_message(adapter, applied, source_us, self._since_us))
+            self._applied.put(applied_message(adapter, applied, source_us, self._in_force))
             self._last_cause = applied.zero_cause

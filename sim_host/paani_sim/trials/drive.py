@@ -14,7 +14,7 @@ from paani import messages as m
 from paani.config import Config
 from paani.cores import load_estimator
 from paani.motion_planning import MotionPlanner
-from paani.thrust_adapter import AppliedThrust, ThrustAdapter, applied_message
+from paani.thrust_adapter import AppliedThrust, InForce, ThrustAdapter, applied_message
 from paani_sim.plant.plant import Plant, PlantDiverged
 from paani_sim.plant.telemetry import gps_message, imu_message, pose_message
 from paani_sim.trials.autonomy_stack import AutonomyStack
@@ -108,8 +108,7 @@ class Drive:
         self._odometry: m.Odometry | None = None
         self._pending_evidence: list[tuple[int, m.Evidence]] = []
         self.frames = 0
-        self._command_in_force: m.Thrust | None = None
-        self._in_force_since_us = START_US
+        self._in_force = InForce()
 
     @property
     def now_us(self) -> int:
@@ -235,13 +234,11 @@ class Drive:
 
     def _record_thrust_and_truth(self, now_us: int) -> None:
         """Record what the thrust adapter applies, and the true pose."""
-        in_force = self.adapter.command if self.applied.zero_cause is m.ZeroCause.NONE else None
-        if in_force is not self._command_in_force:
-            self._command_in_force, self._in_force_since_us = in_force, now_us
-        self.history.record_thrust(self.applied, in_force, now_us)
+        self._in_force.advance(self.applied, self.adapter.command, now_us)
+        self.history.record_thrust(self.applied, self._in_force.command, now_us)
         if self._bus.tap is not None and self._is_due("report"):
             self._bus.put(keys.TRUE_POSE, pose_message(self.plant, now_us))
-            applied = applied_message(self.adapter, self.applied, now_us, self._in_force_since_us)
+            applied = applied_message(self.adapter, self.applied, now_us, self._in_force)
             self._bus.put(keys.THRUST_APPLIED, applied)
 
     def _update_phase(self, now_us: int) -> None:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from paani.config import AdapterConfig
 from paani.messages import Arming, Thrust, ZeroCause
-from paani.thrust_adapter import AppliedThrust, ThrustAdapter, applied_message
+from paani.thrust_adapter import AppliedThrust, InForce, ThrustAdapter, applied_message
 
 NOW_US = 50_000_000
 CONFIG = AdapterConfig()
@@ -279,21 +279,45 @@ def test_force_is_always_within_limits() -> None:
 
 def test_what_is_applied_is_told_with_the_command_behind_it() -> None:
     adapter = ready()
-    none = applied_message(adapter, adapter.decide(NOW_US), 5, 3)
+    in_force = InForce()
+    in_force.advance(adapter.decide(NOW_US), adapter.command, 3)
+    none = applied_message(adapter, adapter.decide(NOW_US), 5, in_force)
     assert (none.source_us, none.since_us, none.zero_cause) == (5, 3, ZeroCause.NO_COMMAND)
     assert (none.command_seq, none.command_sent_us, none.command_source_us, none.rejected) == (0, 0, 0, 0)
     adapter.offer(thrust(producer="advisor"), NOW_US)
     adapter.offer(thrust(sent_us=11, source_us=12), NOW_US)
-    message = applied_message(adapter, adapter.decide(NOW_US), 5, 3)
+    message = applied_message(adapter, adapter.decide(NOW_US), 5, in_force)
     assert (message.left, message.right, message.left_n, message.right_n) == pytest.approx((0.02, 0.04, 1.5, 3.0))
     assert (message.command_seq, message.command_sent_us, message.command_source_us, message.rejected) == (7, 11, 12, 1)
     assert (message.zero_cause, message.lost_pulse) == (ZeroCause.NONE, "")
 
 
+def test_what_is_in_force_is_told_with_its_beginning_and_no_thrust_with_its_own() -> None:
+    """A command of no thrust after a zero for a cause is another command in force, and the same zero."""
+    ahead, still = thrust(), thrust(left=0.0, right=0.0)
+    moving = AppliedThrust(0.02, 0.04, 1.5, 3.0, ZeroCause.NONE)
+    commanded, timed_out = (AppliedThrust(0.0, 0.0, 0.0, 0.0, cause) for cause in (ZeroCause.NONE, ZeroCause.TIMEOUT))
+    in_force, reported = InForce(), []
+    for now_us, (applied, newest) in enumerate(
+        [
+            (timed_out, None),
+            (moving, ahead),
+            (moving, ahead),
+            (timed_out, ahead),
+            (timed_out, ahead),
+            (commanded, still),
+        ]
+    ):
+        in_force.advance(applied, newest, 10 + now_us)
+        message = applied_message(ready(), applied, 99, in_force)
+        reported.append((in_force.command, message.since_us, message.zero_since_us))
+    assert reported == [(None, 10, 10), (ahead, 11, 0), (ahead, 11, 0), (None, 13, 13), (None, 13, 13), (still, 15, 13)]
+
+
 def test_a_message_of_a_lost_pulse_names_the_process() -> None:
     adapter = ThrustAdapter(CONFIG, domain=43)
     adapter.receive_arming(ARMED, NOW_US)
-    message = applied_message(adapter, adapter.decide(NOW_US), 5, 3)
+    message = applied_message(adapter, adapter.decide(NOW_US), 5, InForce())
     assert (message.zero_cause, message.lost_pulse) == (ZeroCause.PULSE_LOST, CONFIG.require_pulses[0])
 
 

@@ -99,8 +99,9 @@ def zero_after_s(
 ) -> float | None:
     """Seconds from the hit to no thrust; None where thrust was never zero.
 
-    The adapter says since when there is none, in its first report without thrust. One that was away itself
-    (dead, or not running: the simulator's time stands still with it) has applied nothing after its last word.
+    The adapter says since when there is none, in its first report without thrust: at the hit already where it says a
+    moment before, of which no report came through. One that was away itself (dead, or not running: the simulator's
+    time stands still with it) has applied nothing after its last word.
     """
     before: Report | None = None
     for report in reports:
@@ -111,8 +112,9 @@ def zero_after_s(
         if not report.moves and before is not None and silent and adapter_away:
             return max(0.0, (before.at_us - hit_us) * 1e-6)
         if not report.moves:
-            since_s, heard_s = (report.since_us - hit_wall_us) * 1e-6, (report.at_us - hit_us) * 1e-6
-            return since_s if 0.0 <= since_s <= heard_s else heard_s  # otherwise its clock was set
+            since_s, heard_s = (report.zero_since_us - hit_wall_us) * 1e-6, (report.at_us - hit_us) * 1e-6
+            was_clock_set = not -SILENCE_S <= since_s <= heard_s
+            return heard_s if was_clock_set else max(0.0, since_s)
         before = report
     return None
 

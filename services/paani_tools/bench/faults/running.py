@@ -45,13 +45,13 @@ class ShiftedClock:
 
 
 class Report(NamedTuple):
-    """What the thrust adapter reported: heard at [us, monotonic]; by its own clock, when and since when."""
+    """What the thrust adapter reported: heard at [us, monotonic]; by its own clock, when, and since when it is zero."""
 
     at_us: int
     moves: bool
     cause: m.ZeroCause
     source_us: int
-    since_us: int
+    zero_since_us: int
 
 
 class Watch:
@@ -75,7 +75,7 @@ class Watch:
 
     def _hear_applied(self, applied: m.ThrustApplied) -> None:
         moves = applied.left_n != 0.0 or applied.right_n != 0.0
-        heard = (MONOTONIC.now_us(), moves, applied.zero_cause, applied.source_us, applied.since_us)
+        heard = (MONOTONIC.now_us(), moves, applied.zero_cause, applied.source_us, applied.zero_since_us)
         self.reports.append(Report(*heard))
 
     def _hear_health(self, health: m.Health) -> None:

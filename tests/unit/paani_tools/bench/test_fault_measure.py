@@ -57,6 +57,11 @@ def test_after_silence_the_adapter_says_since_when() -> None:
     assert zero_after_s(reports, HIT_US, WALL_US) == pytest.approx(0.31)
 
 
+def test_thrust_that_went_between_the_last_report_and_the_hit_was_zero_at_the_hit() -> None:
+    reports = [*DRIVING[:2], report(1.1, moves=False, since_s=-0.02)]
+    assert zero_after_s(reports, HIT_US, WALL_US) == 0.0
+
+
 def test_an_adapter_that_drives_on_in_silence_is_found_out() -> None:
     """It was moving until shortly before it was heard again."""
     reports = [*DRIVING, report(1.4, moves=False, since_s=1.3)]
