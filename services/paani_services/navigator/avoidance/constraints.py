@@ -147,11 +147,18 @@ def unless_escaping(evaluation: CandidateEvaluation, hard: Refusals) -> Refusals
 def unless_clearer_than_coasting(evaluation: CandidateEvaluation, hard: Refusals) -> Refusals:
     """NO_ESCAPE: all whose least clearance is not above that of coasting and nearly the best of all; none too fast.
 
-    A boat with its thrusters off is carried on by its own way, wind and current.
+    A boat with its thrusters off is carried on by its own way, wind and current. What may be somewhere is not fled from
+    into what is there: of static obstacles a way out keeps hull and least margin clear, or as much as coasting does.
     """
+    least = margins(evaluation.request.config)[-1]
+    floor_m = min(evaluation.coasting_static_m - 0.5 * ESCAPE_GAIN_M, least.hull_radius_m + least.margin_m)
     hard = {**hard, Constraint.TOO_FAST: hard[Constraint.TOO_FAST] | evaluation.is_full_speed}
-    clearance_m = np.where(evaluation.is_in_horizon, evaluation.clearance_m, np.inf)
-    least_m = np.where(any_refusal(hard), -np.inf, clearance_m.min(axis=0))
+    static_m, clearance_m = (
+        np.where(evaluation.is_in_horizon, each_m, np.inf)
+        for each_m in (evaluation.static_clearance_m, evaluation.clearance_m)
+    )
+    into_static = static_m.min(axis=0) < floor_m
+    least_m = np.where(any_refusal(hard) | into_static, -np.inf, clearance_m.min(axis=0))
     enough_m = max(evaluation.coasting_clearance_m + ESCAPE_GAIN_M, float(least_m.max()) - 0.5 * ESCAPE_GAIN_M)
     return {**hard, Constraint.NO_ESCAPE: least_m < enough_m}
 

@@ -52,7 +52,7 @@ class CandidateEvaluation(NamedTuple):
     probably they strike the boat is a cost.
     runs_down: which of these will come that near to a boat at rest. They refuse nothing, as it is met as well.
     dynamic: the clearances to all others, which is what the other fields count as dynamic obstacles.
-    coasting_clearance_m: the least within the horizon with the thrusters off.
+    coasting_clearance_m: the least within the horizon with the thrusters off; coasting_static_m: to static ones.
     """
 
     request: PlanRequest
@@ -79,6 +79,7 @@ class CandidateEvaluation(NamedTuple):
     runs_down: Bools
     dynamic: DynamicClearance
     coasting_clearance_m: float
+    coasting_static_m: float
 
     def separation_m(self, step: PlannerConfig) -> F64:
         """Clearance to each dynamic obstacle beyond the required one [obstacles, times, candidates].
@@ -140,6 +141,7 @@ def evaluate_candidates(request: PlanRequest) -> CandidateEvaluation:
         runs_down=runs_down,
         dynamic=dynamic,
         coasting_clearance_m=float(coasting_m[: last + 1].min()),
+        coasting_static_m=float(static_m[: last + 1, -2].min()),
     )
 
 
