@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import Any
 
 import msgspec
 import pytest
@@ -22,6 +23,7 @@ from paani.messages import (
     LaneRisk,
     NavCommand,
     Odometry,
+    Purpose,
     Reason,
     Route,
     SimTime,
@@ -154,6 +156,30 @@ def test_turn_advice_halves_the_speed_and_leans_to_its_side(turn: Direction) -> 
     for order in pool.run(1.5):
         assert not order.enable or order.speed_mps <= 0.5 * CONFIG.cruise_mps
         assert side * order.heading_rad >= -1e-9
+
+
+@pytest.mark.parametrize(
+    ("changes", "escape_mps"),
+    [
+        ({"purpose": Purpose.PASS}, CONFIG.cruise_mps),
+        ({"purpose": Purpose.PASS, "speed_limit_mps": 0.3}, 0.3),
+        ({"purpose": Purpose.LOOK}, 0.0),
+    ],
+    ids=["nobody near", "somebody near", "looking"],
+)
+def test_an_escape_may_be_as_fast_as_the_course_and_as_is_allowed_near_people(
+    changes: dict[str, Any], escape_mps: float
+) -> None:
+    """It is not halved as an advised turn is (M7); where the boat is to look from where it is, there is none."""
+    pool = Pool()
+    pool.settle(0.6)
+    turn = Advisory(source_us=pool.now_us, direction=Direction.LEFT, reason=Reason.CENTER_CLEAR, **changes)
+    heard = pool.heard(turn, odometry(pool.now_us, pool.boat, pool.speed_mps))
+    state, _ = navigate(pool.state, heard, mission_of_route(EAST), pool.now_us, 43, CONFIG, CAMERA)
+    basis = state.planner_state.basis
+    assert basis is not None
+    assert basis.speed_mps == 0.5 * min(CONFIG.cruise_mps, turn.speed_limit_mps or math.inf)
+    assert basis.escape_mps == escape_mps
 
 
 @pytest.mark.parametrize("direction", list(Direction))

@@ -140,7 +140,7 @@ def navigate(
             state, at_station = _keep_station(state, odometry, now_us, config)
         return state, build_command(state, inputs, now_us, inhibits, at_station=at_station, cross_m=cross_m, leg=leg)
     heading_rad, limit_mps = setpoint.course_rad, speed_limit_mps(advisory)
-    speed_mps = min(setpoint.speed_mps, limit_mps)
+    speed_mps = escape_mps = min(setpoint.speed_mps, limit_mps)
     if direction in TURN_DIRECTIONS:
         state = hold_cross_track(state, now_us)
         speed_mps *= config.turn_speed_frac
@@ -153,8 +153,10 @@ def navigate(
         heading_rad = limit_course_rad(setpoint.course_rad, state.passed_obstacles)
     if is_planned and not inhibits and speed_mps > 0.0:
         # The planner weighs the advised side against what the map shows.
+        # It turns as slowly as every advised turn is, but for one out of the way of what would run the boat down.
+        looks = is_turn_to_look(advisory)
         planner_setpoint = GuidanceSetpoint(
-            heading_rad, speed_mps, TURN_SIDE.get(direction, 0.0), is_pivot_only=is_turn_to_look(advisory)
+            heading_rad, speed_mps, TURN_SIDE.get(direction, 0.0), looks, 0.0 if looks else escape_mps
         )
         state, heading_rad, speed_mps, is_path_free = _steer_planned(
             state, odometry, planner_setpoint, now_us, camera, config, mission.bounds, planner

@@ -8,6 +8,7 @@ Constraints and costs keep their names.
 from collections.abc import Iterator
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 
 from paani.geometry import wrap_rad
@@ -74,6 +75,10 @@ def judge_candidates(request: PlanRequest) -> JudgedCandidates | None:
     if request.setpoint.speed_mps <= 0.0 or not request.grid.free.any():
         return None
     evaluation = evaluate_candidates(request)
+    setpoint = request.setpoint
+    if evaluation.runs_down.any() and setpoint.escape_mps > setpoint.speed_mps:
+        setpoint = setpoint._replace(speed_mps=setpoint.escape_mps)
+        evaluation = evaluate_candidates(msgspec.structs.replace(request, setpoint=setpoint))
     hard = hard_constraints(evaluation)
     check = check_margins(evaluation, hard)
     passages = find_passages(evaluation)

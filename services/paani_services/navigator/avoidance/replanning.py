@@ -34,6 +34,7 @@ class PlanBasis(msgspec.Struct, frozen=True, kw_only=True):
     previous: Plan | None
     may_wait: bool
     map_offset_m: tuple[float, float]
+    escape_mps: float = 0.0
 
 
 class PlannerState(
@@ -84,6 +85,8 @@ def replan(
 ) -> tuple[PlannerState, Plan]:
     """The plan for this setpoint, within the fence and no faster than the setpoint allows; by `planner` where given.
 
+    One that is faster than was asked for when it was made leads out of the way of a vessel that runs the boat down.
+
     A new plan is made for a new frame, another course or advised side, or after `replan_s`. Without an odometry pose
     the boat stops.
     """
@@ -101,6 +104,7 @@ def replan(
             previous=plan,
             may_wait=(now_us - since_us) * 1e-6 < config.patience_s,
             map_offset_m=(odometry.x_m - here.x_m, odometry.y_m - here.y_m),
+            escape_mps=setpoint.escape_mps,
         )
         request = _request_plan(state.memory, basis, setpoint, now_us, camera, config, fence)
         plan = plan_motion(request) if planner is None else Plan(*planner(_planning_inputs(request)))
@@ -115,7 +119,9 @@ def replan(
             tuple(sorted({obstacle.track_id for obstacle in request.obstacles} - {0})),
             basis if planner is None else None,
         )
-    return state, msgspec.structs.replace(plan, speed_mps=min(plan.speed_mps, setpoint.speed_mps))
+    is_escape = state.basis is not None and plan.speed_mps > state.basis.speed_mps
+    allowed_mps = max(setpoint.speed_mps, setpoint.escape_mps) if is_escape else setpoint.speed_mps
+    return state, msgspec.structs.replace(plan, speed_mps=min(plan.speed_mps, allowed_mps))
 
 
 def explain_plan(
@@ -128,7 +134,9 @@ def explain_plan(
     basis = state.basis
     if basis is None or state.frame_id != state.memory.frame_id:
         return ()
-    setpoint = GuidanceSetpoint(state.course_rad, basis.speed_mps, state.advised_side, basis.is_pivot_only)
+    setpoint = GuidanceSetpoint(
+        state.course_rad, basis.speed_mps, state.advised_side, basis.is_pivot_only, basis.escape_mps
+    )
     judged = judge_candidates(_request_plan(state.memory, basis, setpoint, state.planned_us, camera, config, fence))
     return tell_headings(judged) if judged is not None and judged.cheapest_plan() == state.plan else ()
 

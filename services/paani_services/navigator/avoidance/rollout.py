@@ -42,12 +42,14 @@ class GuidanceSetpoint(NamedTuple):
 
     advised_side: 1 port, -1 starboard, 0 neither.
     is_pivot_only: a pivot to the advised side is asked for, and no way ahead.
+    escape_mps: the highest speed out of the way of a vessel that runs the boat down, where it is above that asked for.
     """
 
     course_rad: float
     speed_mps: float
     advised_side: float = 0.0
     is_pivot_only: bool = False
+    escape_mps: float = 0.0
 
 
 class Plan(msgspec.Struct, frozen=True, rename={"is_waiting": "waits"}):

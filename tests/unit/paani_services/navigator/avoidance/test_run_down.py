@@ -15,7 +15,8 @@ from paani_services.navigator.avoidance.constraints import any_refusal, hard_con
 from paani_services.navigator.avoidance.evaluation import CandidateEvaluation, evaluate_candidates
 from paani_services.navigator.avoidance.passages import find_passages
 from paani_services.navigator.avoidance.planner import judge_candidates
-from paani_services.navigator.avoidance.rollout import BoatState, GuidanceSetpoint
+from paani_services.navigator.avoidance.replanning import PlanBasis, PlannerState, replan
+from paani_services.navigator.avoidance.rollout import BoatState, GuidanceSetpoint, Plan
 from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle
 from paani_services.navigator.mapping.occupancy_grid import OccupancyGrid, build_occupancy_grid
 from paani_services.navigator.mapping.velocity_fit import Velocity
@@ -26,6 +27,7 @@ from tests.synthetic_water import (
     PLANNER,
     START_US,
     observe_from,
+    odometry,
     open_water,
     plan_on,
     request_on,
@@ -66,7 +68,7 @@ def gap_m(boat: BoatState, bow: DynamicObstacle) -> float:
     return math.hypot(max(along_m, 0.0, -LENGTH_M - along_m), max(aside_m - HALF_BEAM_M, 0.0))
 
 
-def least_gap_m(start: BoatState, vessel: DynamicObstacle, for_s: float) -> float:
+def least_gap_m(start: BoatState, vessel: DynamicObstacle, for_s: float, setpoint: GuidanceSetpoint = AHEAD) -> float:
     """The least `gap_m` of a boat that moves as the planner expects and is given a plan every `PLAN_S`."""
     boat, previous, least_m = start, None, math.inf
     for number in range(round(for_s / PLAN_S)):
@@ -78,7 +80,7 @@ def least_gap_m(start: BoatState, vessel: DynamicObstacle, for_s: float) -> floa
         least_m = min(least_m, gap_m(boat, seen))
         memory = observe_from(BoatPose(boat.x_m, boat.y_m, boat.yaw_rad))
         grid = build_occupancy_grid(memory.observations, (boat.x_m, boat.y_m), START_US, CAMERA, PLANNER)
-        previous = plan_on(grid, boat, AHEAD, previous, PLANNER, (seen,))
+        previous = plan_on(grid, boat, setpoint, previous, PLANNER, (seen,))
         boat = moved(moved(boat, previous, PLANNER), previous, PLANNER)
     return least_m
 
@@ -92,6 +94,70 @@ def test_a_vessel_that_is_known_for_six_seconds_strikes_nobody(
 ) -> None:
     vessel = vessel_from(math.radians(bearing_deg), speed_mps, 6.0, aside_m=0.3)
     assert least_gap_m(start, vessel, 10.0) > 0.45
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("speed_mps", [1.5, 2.2])
+@pytest.mark.parametrize("bearing_deg", [0.0, 15.0, -25.0])
+@pytest.mark.parametrize("advised_side", [1.0, -1.0])
+def test_it_strikes_nobody_who_is_advised_to_turn_slowly(
+    bearing_deg: float, speed_mps: float, advised_side: float
+) -> None:
+    """It is left at the speed of the course; at that of an advised turn, it strikes."""
+    vessel = vessel_from(math.radians(bearing_deg), speed_mps, 6.0, aside_m=0.3)
+    turning = GuidanceSetpoint(0.0, 0.15, advised_side)
+    assert least_gap_m(RESTING, vessel, 10.0, turning._replace(escape_mps=0.6)) > 0.45
+    assert least_gap_m(RESTING, vessel, 10.0, turning) < 0.45
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    bearing_rad=st.floats(-2.0, 2.0),
+    speed_mps=st.floats(0.0, 3.0),
+    aside_m=st.floats(-5.0, 5.0),
+    label=st.sampled_from([Label.VESSEL, Label.PERSON]),
+    surge_mps=st.floats(0.0, 0.6),
+)
+def test_nothing_else_is_left_faster_than_was_asked_for(
+    bearing_rad: float, speed_mps: float, aside_m: float, label: Label, surge_mps: float
+) -> None:
+    vessel, start = vessel_from(bearing_rad, speed_mps, 5.0, label, aside_m), RESTING._replace(surge_mps=surge_mps)
+    turning = GuidanceSetpoint(0.0, 0.3, 1.0)
+    slow, fast = (
+        judge_candidates(request_on(open_water(), start, each, None, PLANNER, (vessel,)))
+        for each in (turning, turning._replace(escape_mps=0.6))
+    )
+    assert slow is not None
+    assert fast is not None
+    if slow.evaluation.runs_down.any():
+        assert fast.evaluation.speeds_mps.max() == 0.6
+    else:
+        assert fast.cheapest_plan() == slow.cheapest_plan()
+        assert fast.evaluation.speeds_mps.max() == 0.3
+
+
+@pytest.mark.parametrize(
+    ("basis_mps", "asked_mps", "escape_mps", "ordered_mps"),
+    [
+        (0.3, 0.3, 0.6, 0.6),  # a plan that leads out of the way
+        (0.3, 0.15, 0.3, 0.3),  # somebody is near by now
+        (0.3, 0.3, 0.0, 0.3),  # the boat is asked to look, where it is
+        (0.6, 0.3, 0.6, 0.3),  # the plan of a course that is turned off now
+        (0.6, 0.6, 0.6, 0.6),
+    ],
+)
+def test_a_plan_in_force_is_as_fast_as_is_allowed_now(
+    basis_mps: float, asked_mps: float, escape_mps: float, ordered_mps: float
+) -> None:
+    basis = PlanBasis(
+        start=RESTING, speed_mps=basis_mps, is_pivot_only=False, previous=None, may_wait=True, map_offset_m=(0.0, 0.0)
+    )
+    memory = observe_from()
+    state = PlannerState(memory, Plan(0.5, 0.6), 0.0, 1.0, START_US, None, memory.frame_id, basis=basis)
+    asked = GuidanceSetpoint(0.0, asked_mps, 1.0, escape_mps=escape_mps)
+    after, plan = replan(state, odometry(START_US, BoatPose(0.0, 0.0, 0.0)), asked, START_US, CAMERA, PLANNER)
+    assert after is state
+    assert plan == Plan(0.5, ordered_mps)
 
 
 @settings(max_examples=40, deadline=None)

@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from paani.messages import Label
+from paani_services.navigator.avoidance.clearance import margins
 from paani_services.navigator.avoidance.constraints import (
     any_refusal,
     hard_constraints,
-    margins,
     unless_clearer_than_coasting,
 )
 from paani_services.navigator.avoidance.evaluation import evaluate_candidates
