@@ -26,6 +26,7 @@ UNSEEN_GROWTH_MPS = 0.1
 APPROACH_S = 30.0
 WANTED_CPA_M = 3.5  # what swimmers and paddlers want between hulls, 3 m, and half a hull
 UNDER_WAY_MPS = (0.1, 0.2)  # slower for certain: adrift; faster for certain: under way
+SWIMMING_MPS = 1.75  # nobody swims faster for long: the record over 1,500 m is 1.73 m/s
 ESCAPE_GAIN_M = 0.1  # clearance that a way out must gain [m]: half a cell
 
 

@@ -51,8 +51,8 @@ def hard_constraints(evaluation: CandidateEvaluation) -> Refusals:
 
     UNKNOWN_WATER: the boat could not stop before water that it does not know. PERSON: nearer to a person than hull and
     `tight_margin_m`, or than the boat is, whatever else it escapes from. TOO_FAST: at full speed that near to anything.
-    TURN: a pivot too small to be made, or not the one asked for; or, for a boat with its whole margin, beyond
-    `span_deg`: it waits before a dead end and does not circle through the far side.
+    TURN: a pivot too small to be made, or not the one asked for; or, for a boat with its whole margin that nothing
+    runs down, beyond `span_deg`: it waits before a dead end and does not circle through the far side.
     """
     setpoint, config = evaluation.request.setpoint, evaluation.request.config
     offsets_rad, travelled_m = evaluation.offsets_rad, evaluation.trajectories.travelled_m
@@ -64,7 +64,8 @@ def hard_constraints(evaluation: CandidateEvaluation) -> Refusals:
     turn = evaluation.is_pivot & (angles_between_rad(offsets_rad, 0.0) < MIN_PIVOT_RAD)
     if setpoint.is_pivot_only:
         turn |= ~evaluation.is_pivot | (setpoint.advised_side * offsets_rad < MIN_PIVOT_RAD)
-    if evaluation.static_clearance_m[0, 0] >= config.hull_radius_m + config.margin_m:
+    has_margin = evaluation.static_clearance_m[0, 0] >= config.hull_radius_m + config.margin_m
+    if has_margin and not evaluation.runs_down.any():
         turn |= np.abs(offsets_rad - offsets_rad[0]) > math.radians(config.span_deg) + 1e-9
     near_person = (evaluation.person_distance_m < person_m) & evaluation.is_in_checked_range
     return {

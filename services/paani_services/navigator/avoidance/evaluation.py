@@ -9,6 +9,7 @@ from paani.arrays import F64, Bools
 from paani.config import PlannerConfig
 from paani.messages import Label
 from paani_services.navigator.avoidance.clearance import (
+    SWIMMING_MPS,
     UNDER_WAY_MPS,
     DynamicClearance,
     clearance_fields_m,
@@ -48,8 +49,8 @@ class CandidateEvaluation(NamedTuple):
     tight_clearance_m: hull and `tight_margin_m`.
     is_give_way_needed: a dynamic obstacle will come nearer than that to a boat that coasts to rest.
     predicted: the clearances to each of the request's `predicted_obstacles`.
-    is_faster: which of them are under way for certain, and faster than the boat may be, but for people [obstacles]. How
-    probably they strike the boat is a cost.
+    is_faster: which of them are under way for certain, and faster than the boat may be, but for who may swim
+    [obstacles]. How probably they strike the boat is a cost.
     runs_down: which of these will come that near to a boat at rest. They refuse nothing, as it is met as well.
     dynamic: the clearances to all others, which is what the other fields count as dynamic obstacles.
     coasting_clearance_m: the least within the horizon with the thrusters off; coasting_static_m: to static ones.
@@ -146,10 +147,13 @@ def evaluate_candidates(request: PlanRequest) -> CandidateEvaluation:
 
 
 def _is_faster(obstacle: DynamicObstacle, limit_mps: float) -> bool:
-    """Whether it is under way for certain and goes faster than the boat may; nobody who swims counts."""
+    """Whether it is under way for certain and goes faster than the boat may; nobody who swims counts.
+
+    A person who is faster for certain than anybody swims is aboard of what goes there.
+    """
+    least_mps = SWIMMING_MPS if obstacle.label is Label.PERSON else UNDER_WAY_MPS[1]
     speed_mps = obstacle.velocity.speed_mps
-    is_under_way = speed_mps - 2.0 * obstacle.velocity.deviation_mps > UNDER_WAY_MPS[1]
-    return obstacle.label is not Label.PERSON and is_under_way and speed_mps > limit_mps
+    return speed_mps - 2.0 * obstacle.velocity.deviation_mps > least_mps and speed_mps > limit_mps
 
 
 def angles_between_rad(angles_rad: F64, other_rad: float) -> F64:

@@ -73,7 +73,7 @@ def find_passages(evaluation: CandidateEvaluation) -> Passages:
     vessels = [
         (obstacle, clearance_m, is_faster)
         for obstacle, clearance_m, is_faster in known
-        if obstacle.label is not Label.PERSON and obstacle.velocity.speed_mps > UNDER_WAY_MPS[0]
+        if (obstacle.label is not Label.PERSON or is_faster) and obstacle.velocity.speed_mps > UNDER_WAY_MPS[0]
     ]
     last = int(evaluation.is_in_horizon.sum()) - 1
     then_s = float(paths.time_s[last])
