@@ -51,6 +51,22 @@ def find_candidates(
     return tuple(sorted((*unsure, *lone), key=lambda c: -c.confidence)[: config.max_count])
 
 
+def is_reflection(mask: U8, detection: Detection, config: CandidateConfig) -> bool:
+    """Whether a box of a person is water alone by the mask, which shows people who are seen that large.
+
+    mask: of the picture as it is, [h, w].
+    """
+    left, top, right, bottom = detection.box_xyxy
+    if detection.label is not Label.PERSON or detection.confidence >= config.reflection_confidence:
+        return False
+    if bottom - top < config.reflection_height:
+        return False
+    rows, columns = (
+        slice(*_cells(*span, count)) for span, count in zip(((top, bottom), (left, right)), mask.shape, strict=True)
+    )
+    return bool((mask[rows, columns] == WATER).all())
+
+
 def people_as_candidates(detections: tuple[Detection, ...]) -> tuple[Candidate, ...]:
     """The people among detections that count for nothing, as their picture is unusable: somebody may be there."""
     return tuple(_unsure_box(d) for d in detections if d.label is Label.PERSON)

@@ -21,7 +21,7 @@ from paani.messages import (
     UnusableCause,
 )
 from paani_services.perception.box_decoding import decode_boxes, decode_people
-from paani_services.perception.candidates import find_candidates, people_as_candidates
+from paani_services.perception.candidates import find_candidates, is_reflection, people_as_candidates
 from paani_services.perception.colour_segmentation import FALLBACK_CONFIDENCE, segment_by_colour
 from paani_services.perception.corridors import CorridorEvidence, classify_cells, find_water_edge, summarise_corridors
 from paani_services.perception.ego_hull import compute_visible_fractions, is_own_hull
@@ -126,6 +126,7 @@ class Perceiver:
         else:
             found = self._detect(bgr)
             segmentation = segmenting.result() if segmenting else self._segment(bgr, roll_rad)  # B4: in turn
+        found = self._without_reflections(found, segmentation)
         cause = self._judge_view(cause, found, segmentation, header.frame_epoch)
         timing = msgspec.structs.replace(
             timing,
@@ -210,6 +211,17 @@ class Perceiver:
             detections = tuple(d for d in detections if not is_own_hull(d.box_xyxy, visible_frac))
             people = tuple(d for d in people if not is_own_hull(d.box_xyxy, visible_frac))
         return Found(detections, people, self._stopwatch_ms() - start_ms)
+
+    def _without_reflections(self, found: Found, segmentation: Segmentation) -> Found:
+        """What was found without people who are water by the mask, unless the mask was drawn by rule."""
+        config, mask = self._config.candidates, segmentation.mask
+        if not config.use or segmentation.source is not SegmentationSource.LEARNED:
+            return found
+        detections, people = (
+            tuple(each for each in boxes if not is_reflection(mask, each, config))
+            for boxes in (found.detections, found.people)
+        )
+        return found._replace(detections=detections, people=people)
 
     def _find_candidates(self, found: Found, segmentation: Segmentation) -> tuple[Candidate, ...] | msgspec.UnsetType:
         """What may be a person; nothing by a mask that was drawn by rule, unset where it is not asked."""

@@ -11,7 +11,12 @@ from paani.arrays import F32, U8
 from paani.config import CandidateConfig, DetectorConfig
 from paani.messages import BoxXyxy, CandidateKind, Detection, Label
 from paani_services.perception.box_decoding import decode_people
-from paani_services.perception.candidates import find_candidates, find_lone_obstacles, stands_in_water
+from paani_services.perception.candidates import (
+    find_candidates,
+    find_lone_obstacles,
+    is_reflection,
+    stands_in_water,
+)
 from paani_services.perception.preprocessing import LetterboxTransform
 
 RULES = CandidateConfig()
@@ -116,3 +121,41 @@ def test_people_are_decoded_by_their_own_score_with_their_own_threshold() -> Non
     assert [(d.label, round(d.confidence, 3), round(d.box_xyxy[0] * 320)) for d in found] == [(Label.PERSON, 0.2, 80)]
     assert decode_people(rows, place, DetectorConfig(), 0.15, ("vessel", "person")) != found
     assert decode_people(rows, place, DetectorConfig(), 0.15, ("vessel", "pier", "buoy", "raft")) == ()
+
+
+BOX = (0.30, 0.60, 0.45, 0.75)
+
+
+@pytest.mark.parametrize(
+    ("detection", "things", "is_it"),
+    [
+        (person(BOX, 0.69), (), True),
+        (person(BOX, 0.70), (), False),  # as sure as the detector is of people in water that the mask missed
+        (person(BOX, 0.69), ((44, 30, 45, 31),), False),  # the mask shows a single cell of somebody
+        (person((0.30, 0.60, 0.45, 0.699), 0.69), (), False),  # so small that the mask may miss them
+        (person((0.30, 0.30, 0.45, 0.45), 0.69), (), False),  # partly before the shore
+        (Detection(label=Label.VESSEL, confidence=0.5, box_xyxy=BOX), (), False),
+    ],
+)
+def test_somebody_large_and_unsure_whom_the_mask_does_not_show_at_all_is_a_reflection(
+    detection: Detection, things: tuple[tuple[int, int, int, int], ...], *, is_it: bool
+) -> None:
+    assert is_reflection(lake(*things), detection, RULES) is is_it
+
+
+@given(
+    st.floats(0.0, 0.9),
+    st.floats(0.4, 0.85),
+    st.floats(0.02, 0.5),
+    st.floats(0.1, 0.5),
+    st.integers(0, ROWS * COLUMNS - 1),
+)
+def test_whoever_has_a_cell_of_the_mask_is_no_reflection(
+    left: float, top: float, width: float, height: float, cell: int
+) -> None:
+    box = (left, top, min(1.0, left + width), min(1.0, top + height))
+    mask = np.full((ROWS, COLUMNS), WATER, np.uint8)
+    mask[cell // COLUMNS, cell % COLUMNS] = OBSTACLE
+    row, column = cell // COLUMNS + 0.5, cell % COLUMNS + 0.5
+    is_inside = box[0] * COLUMNS < column < box[2] * COLUMNS and box[1] * ROWS < row < box[3] * ROWS
+    assert not (is_inside and is_reflection(mask, person(box, 0.5), RULES))

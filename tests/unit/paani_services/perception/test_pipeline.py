@@ -20,6 +20,7 @@ from paani.config import PerceptionConfig, load_config
 from paani.config.perception import WeightSet
 from paani.errors import UserError
 from paani_models.catalogue import OTHER_SETS, load_catalogue, verified_path
+from paani_services.perception.box_decoding import LABELS
 from paani_services.perception.engine import OnnxEngine, network_path
 from paani_services.perception.fitness import load_fitness
 from paani_services.perception.pipeline import Perceiver
@@ -53,6 +54,36 @@ def test_b5_evidence_of_a_picture() -> None:
     assert mask.dtype == np.uint8
     assert set(np.unique(mask)) <= {0, 1, 2}
     assert msgspec.json.decode(msgspec.json.encode(evidence), type=m.Evidence) == evidence
+
+
+@pytest.mark.parametrize(
+    ("profile", "sets", "score", "is_there"),
+    [
+        (None, [], 0.6, False),
+        (None, [], 0.75, True),
+        (None, ["perception.segmenter=none"], 0.6, True),  # a mask drawn by rule shows nobody
+        ("paper", [], 0.6, True),  # C6: what is above the threshold is there
+    ],
+)
+def test_somebody_whom_the_mask_does_not_show_is_a_reflection(
+    monkeypatch: pytest.MonkeyPatch, profile: str | None, sets: list[str], score: float, *, is_there: bool
+) -> None:
+    run = OnnxEngine.run
+
+    def seeing_somebody(engine: OnnxEngine, tensor: Any) -> Any:
+        output = run(engine, tensor)
+        if output.ndim == 3:  # of the detector, in pixels of its input: somebody in the water before the bow
+            height, width = tensor.shape[2:]
+            output = np.zeros_like(output)
+            output[0, :4, 0] = (0.5 * width, 0.75 * height, 0.15 * width, 0.15 * height)
+            output[0, 4 + LABELS.index(m.Label.PERSON), 0] = score
+        return output
+
+    monkeypatch.setattr(OnnxEngine, "run", seeing_somebody)
+    evidence, _ = perceiver(load_config(profile=profile, sets=sets).perception).perceive(river(), HEADER, 0.0)
+    assert evidence.usable
+    assert [each.label for each in evidence.detections] == [m.Label.PERSON] * is_there
+    assert is_there or not evidence.candidates
 
 
 def test_c15_the_threshold_is_one_setting_and_travels() -> None:
