@@ -135,8 +135,8 @@ def test_a_way_out_is_kept_though_the_velocity_is_measured_now_to_one_side_and_n
         for speed_mps in (1.5, 2.2)
         for aside_m in (0.0, 0.5)
     ]
-    assert sum(each.turns for each in escapes) <= len(escapes)
-    assert sum(each.least_m < 0.45 for each in escapes) <= 3
+    assert sum(each.turns for each in escapes) <= 1.5 * len(escapes)
+    assert sum(each.least_m < 0.45 for each in escapes) <= 4
 
 
 @settings(max_examples=40, deadline=None)
