@@ -33,27 +33,27 @@ ALONE = {"bench", "browser", "deploy", "fault", "firmware", "integration", "link
 RESULTS_ALONE = {
     "bench": "board bridge chain eyes fleet judgement recorder soak",
     "browser": """
-        camera_labels exposed_page fleet_page heading_verdicts health_tab indicator_strip installed legibility
+        camera_labels devices_tab exposed_page fleet_page heading_verdicts health_tab indicator_strip installed legibility
         map_objects map_projection map_tiles mission_cells models_report recording_chip recordings_tab replay_page
-        route_editor sensor_strip sizes tuning_strip
+        route_editor sensor_strip sizes tabs time tuning_strip
     """,
     "integration": """
-        authority_matrix certificates claims_check cluster docs doctor examples foxglove graphs inspect package
-        replay stuck_detection trials
+        authority_matrix certificates claims_check cluster docs doctor examples fleet foxglove graphs inspect mavlink
+        package replay ros2 stuck_detection trials up up_offline up_record
     """,
 }  # by folder, the files that wait for results and do not watch the clock
 BESIDE = {f"tests/{folder}/test_{name}.py" for folder, names in RESULTS_ALONE.items() for name in names.split()}
 SOAK = "tests/bench/test_soak.py"  # first, as it sits out its minutes and hardly computes; it yields to nothing
 STOPS_THE_BOAT = {"fault", "link"}  # folders
 WORKER = "PYTEST_XDIST_WORKER" in os.environ  # other tests run at the same time
-NICENESS = 5  # two workers that compute leave more than half of two cores to the one that watches the clock
+NICENESS = 5  # three workers that compute leave more than half of two cores to the one that watches the clock
 MAX_REASON_CHARACTERS = 300
 
 settings.register_profile("quick", max_examples=15, deadline=None)  # for `make check`; everything else tries more
 settings.register_profile("thorough", deadline=None)  # a busy machine fails no test
 settings.load_profile("thorough")
 
-FIRST_PORT, PORTS_OF_A_WORKER, PORT_WORKERS = 20_000, 4_000, 3
+FIRST_PORT, PORTS_OF_A_WORKER, PORT_WORKERS = 20_000, 3_000, 4
 START_TIMEOUT_S = 40.0
 STOP_TIMEOUT_S = 10.0
 
