@@ -33,9 +33,9 @@ ALONE = {"bench", "browser", "deploy", "fault", "firmware", "integration", "link
 RESULTS_ALONE = {
     "bench": "board bridge chain eyes fleet judgement recorder soak",
     "browser": """
-        camera_labels devices_tab exposed_page fleet_page heading_verdicts health_tab indicator_strip installed legibility
-        map_objects map_projection map_tiles mission_cells models_report recording_chip recordings_tab replay_page
-        route_editor sensor_strip sizes tabs time tuning_strip
+        camera_labels devices_tab exposed_page fleet_page heading_verdicts health_tab indicator_strip installed
+        legibility map_objects map_projection map_tiles mission_cells models_report recording_chip recordings_tab
+        replay_page route_editor sensor_strip sizes tabs time tuning_strip
     """,
     "integration": """
         authority_matrix certificates claims_check cluster docs doctor examples fleet foxglove graphs inspect mavlink

@@ -94,8 +94,9 @@ class CandidateConfig(Section, frozen=True):
     water_share: Fraction = 0.80  # of the mask beside and below such a box, which then stands in water
     min_cells: Size = 4  # of the mask: 4 of its 5,120 are 0.1 m seen from 2 m
     max_count: Size = 12  # handed on, the most confident first
-    # A box of a person in which the mask shows water alone is a reflection if it is at least that high and less sure: of
-    # 1,425 boxes on people that are so high, 637 of photographs (157 held out) and 788 rendered, none; 4 surer ones are.
+    # A box of a person in which the mask shows water alone is a reflection if it is at least that high and less sure.
+    # Of 1,425 boxes on people that are so high, 637 of photographs (157 held out) and 788 rendered, none is; 4 surer
+    # ones are.
     reflection_height: Fraction = 0.10  # of the picture; the mask misses a fifth of those of 0.04 to 0.08
     reflection_confidence: Fraction = 0.70  # the least of the four that the mask misses has 0.71
 
