@@ -213,9 +213,10 @@ class Perceiver:
         return Found(detections, people, self._stopwatch_ms() - start_ms)
 
     def _without_reflections(self, found: Found, segmentation: Segmentation) -> Found:
-        """What was found without people who are water by the mask, unless the mask was drawn by rule."""
+        """What was found without people who are water by the mask, where the full set's networks say both."""
         config, mask = self._config.candidates, segmentation.mask
-        if not config.use or segmentation.source is not SegmentationSource.LEARNED:
+        is_full_set = self._config.weights == "full" and not self._config.detector and not self._config.segmenter
+        if not config.use or not is_full_set or segmentation.source is not SegmentationSource.LEARNED:
             return found
         detections, people = (
             tuple(each for each in boxes if not is_reflection(mask, each, config))

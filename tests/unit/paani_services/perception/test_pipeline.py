@@ -62,6 +62,8 @@ def test_b5_evidence_of_a_picture() -> None:
         (None, [], 0.6, False),
         (None, [], 0.75, True),
         (None, ["perception.segmenter=none"], 0.6, True),  # a mask drawn by rule shows nobody
+        (None, ["perception.weights=open"], 0.6, True),  # whose mask misses people
+        (None, [f"perception.detector={verified_path('detector')}"], 0.6, True),  # a network of one's own
         ("paper", [], 0.6, True),  # C6: what is above the threshold is there
     ],
 )
