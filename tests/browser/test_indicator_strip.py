@@ -61,9 +61,7 @@ async def test_the_strip_shows_what_the_microcontroller_shows(
         await page.screenshot(path=tmp_path / "indicator.png")
 
         state = GONE
-        await until(page, f"{STRIP}.dataset.problem === 'true'")
-        assert await page.inner_text("#indicator-word") == "UNKNOWN"
-        assert await page.inner_text("#indicator-facts") == f"{LINE}: vanished"
+        await until(page, f"{STRIP}.dataset.problem === 'true' && {shows('UNKNOWN', f'{LINE}: vanished')}")
         await page.screenshot(path=tmp_path / "vanished.png")
 
         state = None

@@ -61,9 +61,8 @@ def is_reflection(mask: U8, detection: Detection, config: CandidateConfig) -> bo
         return False
     if bottom - top < config.reflection_height:
         return False
-    rows, columns = (
-        slice(*_cells(*span, count)) for span, count in zip(((top, bottom), (left, right)), mask.shape, strict=True)
-    )
+    height, width = mask.shape
+    rows, columns = slice(*_cells(top, bottom, height)), slice(*_cells(left, right, width))
     return bool((mask[rows, columns] == WATER).all())
 
 

@@ -25,7 +25,7 @@ from paani_services.perception.candidates import find_candidates, is_reflection,
 from paani_services.perception.colour_segmentation import FALLBACK_CONFIDENCE, segment_by_colour
 from paani_services.perception.corridors import CorridorEvidence, classify_cells, find_water_edge, summarise_corridors
 from paani_services.perception.ego_hull import compute_visible_fractions, is_own_hull
-from paani_services.perception.engine import Engine, load_network
+from paani_services.perception.engine import Engine, load_network, network_path
 from paani_services.perception.fitness import load_fitness
 from paani_services.perception.image_quality import ImageQualityState, check_image_quality
 from paani_services.perception.picture_decoding import decode_picture
@@ -72,6 +72,7 @@ class Perceiver:
         self._segmenter = (
             None if config.segmenter == NO_SEGMENTER else load_network("segmenter", config, config.intra_op_threads)
         )
+        self._is_full_set = not any(network_path(role, config) for role in ("detector", "segmenter"))
         engines = [engine for engine in (self._detector, self._segmenter) if engine]
         self._models = ", ".join(engine.info() for engine in engines)
         self._tables = [lookup_tables_for(engine.contract) for engine in engines]
@@ -215,8 +216,7 @@ class Perceiver:
     def _without_reflections(self, found: Found, segmentation: Segmentation) -> Found:
         """What was found without people who are water by the mask, where the full set's networks say both."""
         config, mask = self._config.candidates, segmentation.mask
-        is_full_set = self._config.weights == "full" and not self._config.detector and not self._config.segmenter
-        if not config.use or not is_full_set or segmentation.source is not SegmentationSource.LEARNED:
+        if not config.use or not self._is_full_set or segmentation.source is not SegmentationSource.LEARNED:
             return found
         detections, people = (
             tuple(each for each in boxes if not is_reflection(mask, each, config))

@@ -154,11 +154,8 @@ def unless_clearer_than_coasting(evaluation: CandidateEvaluation, hard: Refusals
     least = margins(evaluation.request.config)[-1]
     floor_m = min(evaluation.coasting_static_m - 0.5 * ESCAPE_GAIN_M, least.hull_radius_m + least.margin_m)
     hard = {**hard, Constraint.TOO_FAST: hard[Constraint.TOO_FAST] | evaluation.is_full_speed}
-    static_m, clearance_m = (
-        np.where(evaluation.is_in_horizon, each_m, np.inf)
-        for each_m in (evaluation.static_clearance_m, evaluation.clearance_m)
-    )
-    into_static = static_m.min(axis=0) < floor_m
+    clearance_m = np.where(evaluation.is_in_horizon, evaluation.clearance_m, np.inf)
+    into_static = ((evaluation.static_clearance_m < floor_m) & evaluation.is_in_horizon).any(axis=0)
     least_m = np.where(any_refusal(hard) | into_static, -np.inf, clearance_m.min(axis=0))
     enough_m = max(evaluation.coasting_clearance_m + ESCAPE_GAIN_M, float(least_m.max()) - 0.5 * ESCAPE_GAIN_M)
     return {**hard, Constraint.NO_ESCAPE: least_m < enough_m}
