@@ -17,6 +17,7 @@ from paani.messages import STATION_ASTERN_MPS, Inhibit, NavCommand, Odometry, Th
 
 MAP_FRAME = "map"
 STANDSTILL_ORDER_MPS = 0.01  # a slower order asks the boat to stand still
+TURNING_RADPS = 0.05  # a boat that turns faster turns for certain: five times the noise of a cheap gyro
 MAX_STEP_S = 0.3  # a longer gap since the last step is integrated and slewed as this long, three periods at 10 Hz
 
 
@@ -69,7 +70,7 @@ def compute_thrust(
     max_steer = config.max_steer
     if command.keeps_station:
         max_steer = min(max_steer, config.astern + forward)  # a couple, of which neither fan's part is cut
-    heading_error_rad = wrap_rad(command.heading_rad - odometry.yaw_rad)
+    heading_error_rad = _turn_rad(command.heading_rad, odometry, config)
     steering = clip(
         config.heading_kp * heading_error_rad - config.heading_kd * odometry.yaw_rate_radps,
         -max_steer,
@@ -89,6 +90,19 @@ def compute_thrust(
         heading_error_rad=heading_error_rad,
         command_sent_us=command.sent_us,
     )
+
+
+def _turn_rad(heading_rad: float, odometry: Odometry, config: ControllerConfig) -> float:
+    """The turn to a heading: the shorter one, but for a heading nearly astern, to which a turn under way goes on.
+
+    Which way is shorter to a heading astern changes with the noise of the compass and with each small change of the
+    order, and a boat that turned back each time would not turn at all.
+    """
+    shorter_rad, rate_radps = wrap_rad(heading_rad - odometry.yaw_rad), odometry.yaw_rate_radps
+    is_astern = abs(shorter_rad) > math.radians(config.turn_on_deg)
+    if is_astern and shorter_rad * rate_radps < 0.0 and abs(rate_radps) > TURNING_RADPS:
+        return shorter_rad + math.copysign(2.0 * math.pi, rate_radps)
+    return shorter_rad
 
 
 def _without_way(state: ControllerState, beyond_mps: float) -> ControllerState:

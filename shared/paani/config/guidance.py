@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from paani.config.planner import PlannerConfig
+from paani.config.planner import Angle, PlannerConfig
 from paani.config.section import Fraction, NonNegative, Positive, Section
 
 Latitude = Annotated[float, msgspec.Meta(ge=-90.0, le=90.0)]
@@ -89,6 +89,8 @@ class ControllerConfig(Section, frozen=True):
     """From an order to the thrust of two fans.
 
     `astern`: the most that a fan pushes astern, to brake and to turn on the spot; 0: never.
+    `turn_on_deg`: to a heading further off the bow a boat that turns turns on, though the other way may be shorter; 180:
+    always the shorter way.
     """
 
     rate_hz: Positive = 10.0  # N1: each order is answered at once; without one, a little less often than this
@@ -105,6 +107,7 @@ class ControllerConfig(Section, frozen=True):
     max_forward: Fraction = 0.15  # of a fan's force: enough for `max_speed_mps`, with some left; N5: 0.08
     max_steer: Fraction = 0.10  # of a fan's force, to each side; N5: 0.04
     astern: Fraction = 0.10  # `max_steer`, so that a turn on the spot is a pure couple
+    turn_on_deg: Angle = 150.0  # there the shorter way saves 3 s of 10, and less further astern; N4: the shorter way
     max_integral: Fraction = 0.03  # what the integral may add at most: a fifth of `max_forward`
     slew_per_s: Positive = 0.5  # full thrust in two seconds; a stop is not limited; N6: 0.15
     command_max_receipt_s: Positive = 0.35  # three periods and a half of `navigator.rate_hz`; then zero thrust

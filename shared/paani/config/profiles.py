@@ -70,6 +70,7 @@ PAPER: dict[str, object] = {
         "drag_feed_forward": False,
         "heading_kp": 0.08,  # N4
         "heading_kd": 0.05,  # N4
+        "turn_on_deg": 180.0,  # N4
         "max_forward": 0.08,  # N5
         "max_steer": 0.04,  # N5
         "slew_per_s": 0.15,  # N6

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from paani.config import ControllerConfig, load_config
+from paani.geometry import wrap_rad
 from paani.messages import Direction, Inhibit, NavCommand, Odometry, Thrust
 from paani_services.controller.control import ControllerInputs, ControllerState, compute_thrust
 
@@ -85,6 +86,22 @@ def test_heading_error_goes_the_short_way_round() -> None:
     thrust = settle(PAPER, command(heading_rad=math.pi - 0.1), odometry(yaw_rad=-math.pi + 0.1))
     assert thrust.heading_error_rad == pytest.approx(-0.2)
     assert thrust.left > thrust.right
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_turn_goes_on_past_a_heading_astern(side: float) -> None:
+    """An order that swings by a degree about astern leaves a boat turning the way it turns; one at rest turns either."""
+    turning = odometry(yaw_rate_radps=0.3 * side)
+    for astern_deg in (151.0, 179.0, 181.0, 209.0):
+        thrust = settle(ControllerConfig(), command(heading_rad=wrap_rad(side * math.radians(astern_deg))), turning)
+        assert (thrust.right - thrust.left) * side > 0.0
+        assert abs(thrust.heading_error_rad) == pytest.approx(math.radians(astern_deg))
+    for astern_deg in (149.0, 179.0, -179.0, -149.0):
+        rad = math.radians(astern_deg)
+        assert settle(ControllerConfig(), command(heading_rad=rad), odometry()).heading_error_rad == pytest.approx(rad)
+        if abs(astern_deg) < 150.0:
+            assert settle(ControllerConfig(), command(heading_rad=rad), turning).heading_error_rad == pytest.approx(rad)
+        assert settle(PAPER, command(heading_rad=rad), turning).heading_error_rad == pytest.approx(rad)
 
 
 def test_n6_slew_limits_each_fan_both_ways() -> None:
