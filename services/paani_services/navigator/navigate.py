@@ -140,7 +140,8 @@ def navigate(
             state, at_station = _keep_station(state, odometry, now_us, config)
         return state, build_command(state, inputs, now_us, inhibits, at_station=at_station, cross_m=cross_m, leg=leg)
     heading_rad, limit_mps = setpoint.course_rad, speed_limit_mps(advisory)
-    speed_mps = escape_mps = min(setpoint.speed_mps, limit_mps)
+    speed_mps = min(setpoint.speed_mps, limit_mps)
+    escape_mps = min(setpoint.speed_mps * config.escape_factor, limit_mps)
     if direction in TURN_DIRECTIONS:
         state = hold_cross_track(state, now_us)
         speed_mps *= config.turn_speed_frac

@@ -78,7 +78,8 @@ def judge_candidates(request: PlanRequest) -> JudgedCandidates | None:
     setpoint = request.setpoint
     if evaluation.runs_down.any() and setpoint.escape_mps > setpoint.speed_mps:
         setpoint = setpoint._replace(speed_mps=setpoint.escape_mps)
-        evaluation = evaluate_candidates(msgspec.structs.replace(request, setpoint=setpoint))
+        config = msgspec.structs.replace(request.config, speed_mps=max(request.config.speed_mps, setpoint.escape_mps))
+        evaluation = evaluate_candidates(msgspec.structs.replace(request, setpoint=setpoint, config=config))
     hard = hard_constraints(evaluation)
     check = check_margins(evaluation, hard)
     passages = find_passages(evaluation)

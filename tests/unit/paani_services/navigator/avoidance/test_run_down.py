@@ -128,6 +128,26 @@ def test_it_strikes_nobody_who_is_advised_to_turn_slowly(
 
 
 @pytest.mark.slow
+def test_fewer_strike_who_leaves_faster_than_its_course() -> None:
+    """Known 4 s before, of vessels from five bearings at four speeds: 19 of 40 strike at 0.6 m/s, and 14 at 0.9."""
+    struck = {
+        escape_mps: sum(
+            escape_from(
+                vessel_from(math.radians(bearing_deg), speed_mps, 4.0, aside_m=0.3),
+                start,
+                GuidanceSetpoint(0.0, 0.6, escape_mps=escape_mps),
+            ).least_m
+            < 0.45
+            for start in (RESTING, CRUISING)
+            for bearing_deg in (0.0, 15.0, -25.0, 60.0, -90.0)
+            for speed_mps in (1.0, 1.5, 2.2, 3.0)
+        )
+        for escape_mps in (0.6, 0.9)
+    }
+    assert struck[0.9] <= struck[0.6] - 3
+
+
+@pytest.mark.slow
 def test_a_way_out_is_kept_though_the_velocity_is_measured_now_to_one_side_and_now_to_the_other() -> None:
     escapes = [
         escape_from(vessel_from(math.radians(bearing_deg), speed_mps, 6.0, aside_m=aside_m), RESTING, wavering_mps=0.25)
@@ -146,20 +166,21 @@ def test_a_way_out_is_kept_though_the_velocity_is_measured_now_to_one_side_and_n
     aside_m=st.floats(-5.0, 5.0),
     label=st.sampled_from([Label.VESSEL, Label.PERSON]),
     surge_mps=st.floats(0.0, 0.6),
+    escape_mps=st.sampled_from([0.6, 0.9]),
 )
 def test_nothing_else_is_left_faster_than_was_asked_for(
-    bearing_rad: float, speed_mps: float, aside_m: float, label: Label, surge_mps: float
+    bearing_rad: float, speed_mps: float, aside_m: float, label: Label, surge_mps: float, escape_mps: float
 ) -> None:
     vessel, start = vessel_from(bearing_rad, speed_mps, 5.0, label, aside_m), RESTING._replace(surge_mps=surge_mps)
     turning = GuidanceSetpoint(0.0, 0.3, 1.0)
     slow, fast = (
         judge_candidates(request_on(open_water(), start, each, None, PLANNER, (vessel,)))
-        for each in (turning, turning._replace(escape_mps=0.6))
+        for each in (turning, turning._replace(escape_mps=escape_mps))
     )
     assert slow is not None
     assert fast is not None
     if slow.evaluation.runs_down.any():
-        assert fast.evaluation.speeds_mps.max() == 0.6
+        assert fast.evaluation.speeds_mps.max() == escape_mps
     else:
         assert fast.cheapest_plan() == slow.cheapest_plan()
         assert fast.evaluation.speeds_mps.max() == 0.3
