@@ -72,14 +72,27 @@ def plan_motion(request: PlanRequest) -> Plan:
 
 def judge_candidates(request: PlanRequest) -> JudgedCandidates | None:
     """Check and weigh the candidates that `plan_motion` chooses from; None where none is considered."""
-    if request.setpoint.speed_mps <= 0.0 or not request.grid.free.any():
+    setpoint, config = request.setpoint, request.config
+    if setpoint.speed_mps <= 0.0 or not request.grid.free.any():
         return None
+    judged = _judge(request)
+    if setpoint.escape_mps > setpoint.speed_mps and _needs_escape(judged):
+        escape = setpoint._replace(speed_mps=setpoint.escape_mps)
+        config = msgspec.structs.replace(config, speed_mps=max(config.speed_mps, setpoint.escape_mps))
+        return _judge(msgspec.structs.replace(request, setpoint=escape, config=config))
+    return judged
+
+
+def _needs_escape(judged: JudgedCandidates) -> bool:
+    """Whether something runs the boat down, or comes to a boat that has no way out of it as fast as was asked for."""
+    evaluation = judged.evaluation
+    is_stuck = any_refusal(judged.refusals).all()
+    return bool(evaluation.runs_down.any() or (evaluation.is_give_way_needed and is_stuck))
+
+
+def _judge(request: PlanRequest) -> JudgedCandidates:
+    """Check and weigh the candidates at the speeds that this request allows."""
     evaluation = evaluate_candidates(request)
-    setpoint = request.setpoint
-    if evaluation.runs_down.any() and setpoint.escape_mps > setpoint.speed_mps:
-        setpoint = setpoint._replace(speed_mps=setpoint.escape_mps)
-        config = msgspec.structs.replace(request.config, speed_mps=max(request.config.speed_mps, setpoint.escape_mps))
-        evaluation = evaluate_candidates(msgspec.structs.replace(request, setpoint=setpoint, config=config))
     hard = hard_constraints(evaluation)
     check = check_margins(evaluation, hard)
     passages = find_passages(evaluation)
