@@ -19,6 +19,7 @@ from paani_services.navigator.mapping.dynamic_obstacles import (
 )
 from paani_services.navigator.mapping.observation import ObservationMemory
 from paani_services.navigator.mapping.occupancy_grid import build_occupancy_grid
+from paani_services.navigator.mapping.velocity_fit import Velocity
 from paani_sim.eye.camera import BoatPose, project
 from tests.synthetic_water import (
     AT_REST,
@@ -28,6 +29,7 @@ from tests.synthetic_water import (
     START_US,
     detection_of,
     observe_from,
+    open_water,
     water_edge_of,
 )
 
@@ -176,6 +178,24 @@ def test_an_obstacle_is_refuted_where_pictures_show_water_at_its_predicted_posit
         found.append(is_refuted(obstacle, grid))
     assert not any(found[:4])
     assert found[-1] is denied
+
+
+@pytest.mark.parametrize(
+    ("shown", "denied"), [("free", True), ("occupied", True), ("occluded", False), ("unknown", False)]
+)
+@pytest.mark.parametrize("age_s", [0.9, 1.1])
+def test_who_is_not_where_it_would_be_seen_is_not_there(shown: str, denied: bool, age_s: float) -> None:
+    """What stands there now is seen, and no vessel under way; what stood there hides who may be there."""
+    grid, velocity = open_water(), Velocity(0.3, 0.0, 0.05)
+    cells = np.zeros_like(grid.free)
+    cells[48:52, 60:64] = shown != "free"
+    grid = grid._replace(
+        free=grid.free & ~cells,
+        occupied=cells & (shown in {"occupied", "occluded"}),
+        occluded=cells & (shown == "occluded"),
+    )
+    obstacle = DynamicObstacle(np.full(3, 2.4), np.array([-0.2, 0.0, 0.2]), 0.2, velocity, age_s, frozenset())
+    assert is_refuted(obstacle, grid) is (denied and age_s > 1.0)
 
 
 def test_an_obstacle_out_of_sight_is_predicted_and_occupies_where_it_was_last_seen() -> None:
