@@ -90,7 +90,7 @@ def test_heading_error_goes_the_short_way_round() -> None:
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_a_turn_goes_on_past_a_heading_astern(side: float) -> None:
-    """An order that swings by a degree about astern leaves a boat turning the way it turns; one at rest turns either."""
+    """An order that swings about astern leaves a boat turning the way it turns; one at rest turns either way."""
     turning = odometry(yaw_rate_radps=0.3 * side)
     for astern_deg in (151.0, 179.0, 181.0, 209.0):
         thrust = settle(ControllerConfig(), command(heading_rad=wrap_rad(side * math.radians(astern_deg))), turning)
