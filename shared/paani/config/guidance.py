@@ -62,8 +62,8 @@ class NavigatorConfig(Section, frozen=True):
     fence_stop_s: Positive = 5.0  # way to stop over speed; measured: 3.6 s for otter from 0.6 m/s, adrift in wind
     fence_return: bool = False  # outside the fence, obey orders that lead straight back in
     cruise_mps: Positive = 0.6  # M7: 0.15; at 0.6 the boat stops within 0.9 m
-    # Times the course's speed, out of the way of a vessel that runs the boat down: `controller.max_speed_mps` at cruise. Of
-    # 120 vessels known 6 s before, with a velocity measured within 0.25 m/s, 23 strike with 1 and 12 with 1.5.
+    # Times the course's speed, out of the way of what comes to the boat: `controller.max_speed_mps` at cruise. Of 120
+    # vessels known 6 s before, with a velocity measured within 0.25 m/s, 23 strike with 1 and 12 with 1.5.
     escape_factor: Annotated[float, msgspec.Meta(ge=1.0, le=3.0)] = 1.5
     turn_speed_frac: Fraction = 0.5  # M7: of cruise, during advised turns
     turn_deg: Positive = 25.0  # M5: off the present heading, for LEFT and RIGHT
@@ -92,8 +92,8 @@ class ControllerConfig(Section, frozen=True):
     """From an order to the thrust of two fans.
 
     `astern`: the most that a fan pushes astern, to brake and to turn on the spot; 0: never.
-    `turn_on_deg`: to a heading further off the bow a boat that turns turns on, though the other way may be shorter; 180:
-    always the shorter way.
+    `turn_on_deg`: to a heading further off the bow a boat that turns turns on, though the other way may be shorter;
+    180: always the shorter way.
     """
 
     rate_hz: Positive = 10.0  # N1: each order is answered at once; without one, a little less often than this
