@@ -181,18 +181,18 @@ def test_an_obstacle_is_refuted_where_pictures_show_water_at_its_predicted_posit
 
 
 @pytest.mark.parametrize(
-    ("shown", "denied"), [("free", True), ("occupied", True), ("occluded", False), ("unknown", False)]
+    ("occupancy", "denied"), [("free", True), ("occupied", True), ("occluded", False), ("unknown", False)]
 )
 @pytest.mark.parametrize("age_s", [0.9, 1.1])
-def test_who_is_not_where_it_would_be_seen_is_not_there(shown: str, denied: bool, age_s: float) -> None:
+def test_who_is_not_where_it_would_be_seen_is_not_there(occupancy: str, denied: bool, age_s: float) -> None:
     """What stands there now is seen, and no vessel under way; what stood there hides who may be there."""
     grid, velocity = open_water(), Velocity(0.3, 0.0, 0.05)
     cells = np.zeros_like(grid.free)
-    cells[48:52, 60:64] = shown != "free"
+    cells[48:52, 60:64] = occupancy != "free"
     grid = grid._replace(
         free=grid.free & ~cells,
-        occupied=cells & (shown in {"occupied", "occluded"}),
-        occluded=cells & (shown == "occluded"),
+        occupied=cells & (occupancy in {"occupied", "occluded"}),
+        occluded=cells & (occupancy == "occluded"),
     )
     obstacle = DynamicObstacle(np.full(3, 2.4), np.array([-0.2, 0.0, 0.2]), 0.2, velocity, age_s, frozenset())
     assert is_refuted(obstacle, grid) is (denied and age_s > 1.0)
