@@ -191,17 +191,16 @@ def _latest_track_id(track: list[PositionMeasurement]) -> int:
 
 
 def is_refuted(obstacle: DynamicObstacle, grid: OccupancyGrid) -> bool:
-    """Whether the pictures show everywhere an obstacle should be that is out of sight: it did not go on.
+    """Whether the pictures show water everywhere an obstacle should be that is out of sight: it did not go on.
 
-    They show water there, or what stands there. That counts after `MIN_UNSEEN_S` out of sight.
+    That counts after `MIN_UNSEEN_S` out of sight.
     """
     if obstacle.age_s < MIN_UNSEEN_S:
         return False
     column = np.floor((obstacle.east_m - grid.west_m) / CELL_M).astype(np.int64)
     row = np.floor((obstacle.north_m - grid.south_m) / CELL_M).astype(np.int64)
     on_grid = (column >= 0) & (column < GRID_CELLS) & (row >= 0) & (row < GRID_CELLS)
-    in_sight = grid.free | (grid.occupied & ~grid.occluded)
-    return bool(on_grid.all() and in_sight[row, column].all())
+    return bool(on_grid.all() and grid.free[row, column].all())
 
 
 def _associate_measurements(
