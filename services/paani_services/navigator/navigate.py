@@ -154,7 +154,7 @@ def navigate(
         heading_rad = limit_course_rad(setpoint.course_rad, state.passed_obstacles)
     if is_planned and not inhibits and speed_mps > 0.0:
         # The planner weighs the advised side against what the map shows.
-        # It turns as slowly as every advised turn is, but for one out of the way of what would run the boat down.
+        # It turns as slowly as every advised turn is, but for one out of the way of what comes to the boat.
         looks = is_turn_to_look(advisory)
         planner_setpoint = GuidanceSetpoint(
             heading_rad, speed_mps, TURN_SIDE.get(direction, 0.0), looks, 0.0 if looks else escape_mps

@@ -75,29 +75,26 @@ def judge_candidates(request: PlanRequest) -> JudgedCandidates | None:
     setpoint, config = request.setpoint, request.config
     if setpoint.speed_mps <= 0.0 or not request.grid.free.any():
         return None
-    judged = _judge(request)
-    if setpoint.escape_mps > setpoint.speed_mps and _needs_escape(judged):
-        escape = setpoint._replace(speed_mps=setpoint.escape_mps)
-        config = msgspec.structs.replace(config, speed_mps=max(config.speed_mps, setpoint.escape_mps))
-        return _judge(msgspec.structs.replace(request, setpoint=escape, config=config))
-    return judged
-
-
-def _needs_escape(judged: JudgedCandidates) -> bool:
-    """Whether something runs the boat down, or comes to a boat that has no way out of it as fast as was asked for."""
-    evaluation = judged.evaluation
-    is_stuck = any_refusal(judged.refusals).all()
-    return bool(evaluation.runs_down.any() or (evaluation.is_give_way_needed and is_stuck))
-
-
-def _judge(request: PlanRequest) -> JudgedCandidates:
-    """Check and weigh the candidates at the speeds that this request allows."""
     evaluation = evaluate_candidates(request)
+    if setpoint.escape_mps <= setpoint.speed_mps:
+        return _judge(evaluation)
+    if not evaluation.runs_down.any():
+        judged = _judge(evaluation)
+        # What comes to a boat that has no way out of it as fast as was asked for is left faster too.
+        if not (evaluation.is_give_way_needed and any_refusal(judged.refusals).all()):
+            return judged
+    escape = setpoint._replace(speed_mps=setpoint.escape_mps)
+    config = msgspec.structs.replace(config, speed_mps=max(config.speed_mps, setpoint.escape_mps))
+    return _judge(evaluate_candidates(msgspec.structs.replace(request, setpoint=escape, config=config)))
+
+
+def _judge(evaluation: CandidateEvaluation) -> JudgedCandidates:
+    """Check and weigh the candidates."""
     hard = hard_constraints(evaluation)
     check = check_margins(evaluation, hard)
     passages = find_passages(evaluation)
     costs = weigh_candidates(evaluation, check.margin_m, passages)
-    is_waiting = request.may_wait and evaluation.is_safe_at_rest and _is_held_up(evaluation, check)
+    is_waiting = evaluation.request.may_wait and evaluation.is_safe_at_rest and _is_held_up(evaluation, check)
     if is_waiting:
         refusals = while_waiting(evaluation, hard, check)
     else:

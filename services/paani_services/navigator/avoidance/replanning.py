@@ -85,7 +85,7 @@ def replan(
 ) -> tuple[PlannerState, Plan]:
     """The plan for this setpoint, within the fence and no faster than the setpoint allows; by `planner` where given.
 
-    One that is faster than was asked for when it was made leads out of the way of a vessel that runs the boat down.
+    One that is faster than was asked for when it was made leads out of the way of what comes to the boat.
 
     A new plan is made for a new frame, another course or advised side, or after `replan_s`. Without an odometry pose
     the boat stops.

@@ -42,7 +42,7 @@ class GuidanceSetpoint(NamedTuple):
 
     advised_side: 1 port, -1 starboard, 0 neither.
     is_pivot_only: a pivot to the advised side is asked for, and no way ahead.
-    escape_mps: the highest speed out of the way of a vessel that runs the boat down, where it is above that asked for.
+    escape_mps: the highest speed out of the way of what comes to the boat, where it is above that asked for.
     """
 
     course_rad: float

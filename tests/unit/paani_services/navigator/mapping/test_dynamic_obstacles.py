@@ -184,7 +184,7 @@ def test_an_obstacle_is_refuted_where_pictures_show_water_at_its_predicted_posit
     ("occupancy", "denied"), [("free", True), ("occupied", False), ("occluded", False), ("unknown", False)]
 )
 @pytest.mark.parametrize("age_s", [0.9, 1.1])
-def test_who_is_not_where_it_would_be_seen_is_not_there(occupancy: str, denied: bool, age_s: float) -> None:
+def test_water_alone_refutes_who_is_out_of_sight(occupancy: str, denied: bool, age_s: float) -> None:
     """What stands or stood there may hide who is there: how deep it is is not seen."""
     grid, velocity = open_water(), Velocity(0.3, 0.0, 0.05)
     cells = np.zeros_like(grid.free)
