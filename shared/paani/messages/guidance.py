@@ -116,6 +116,7 @@ class Thrust(Message, frozen=True, kw_only=True):
 
     `enabled` false: zero thrust for the reasons in `inhibits`. `echo_us`, from the order, is the newest stamp of the
     plant's clock that the navigator had. `command_sent_us` is when that order was sent.
+    `heading_error_rad`: of the turn that is made, so beyond pi where it goes the longer way (`controller.turn_on_deg`).
     """
 
     left: Signed
