@@ -68,7 +68,7 @@ class KinematicDrive(NamedTuple):
 def open_water(start: BoatState) -> OccupancyGrid:
     """A grid of free water around the boat."""
     none, half_m = np.zeros((GRID_CELLS, GRID_CELLS), bool), 0.5 * CELL_M * GRID_CELLS
-    return OccupancyGrid(start.x_m - half_m, start.y_m - half_m, none, none, ~none, none, none, none)
+    return OccupancyGrid(start.x_m - half_m, start.y_m - half_m, none, none, ~none, none, none, none, none)
 
 
 def moved(boat: BoatState, plan: Plan, config: PlannerConfig) -> BoatState:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import msgspec
 import pytest
@@ -12,9 +12,10 @@ import pytest
 from paani.config import load_config
 from paani.fence_geometry import distance_to_edge_m, is_allowed
 from paani.messages import Advisory, Direction, FenceArea, Inhibit, Keep, Reason, Waypoint
+from paani.motion_planning import HeadingSpeed, PlanningInputs
 from paani_sim.worlds import Current, Wind, World
 from tests.scenario.test_closed_loop_guidance import Lockstep, off_route_m, open_water
-from tests.synthetic_water import CAMERA
+from tests.synthetic_water import AT_REST, CAMERA, evidence, water_edge_of
 
 PERFECT = ("plant.sensors.gps_bias_std_m=0.0", "plant.sensors.compass_bias_std_rad=0.0", "plant.vessel=otter")
 
@@ -64,29 +65,48 @@ def test_the_integral_holds_the_line_against_wind_and_current(windy_lake: World)
     assert worst_m[0.0] > 1.0
 
 
-def farthest_while_stopped_m(world: World, *sets: str) -> float:
-    """How far the boat ever is from where it was [m] in 90 s of a STOP for what lies on the water."""
-    boat = Lockstep(world, load_config(sets=(*PERFECT, *sets)))
-    boat.camera = CAMERA
-    from_m, farthest_m = boat.plant.position_m, 0.0
+def halt(given: PlanningInputs) -> HeadingSpeed:
+    """No path."""
+    return HeadingSpeed(given.yaw_rad, 0.0)
+
+
+def stop_by_the_advice(boat: Lockstep) -> Inhibit:
     boat.advisory = Advisory(
         source_us=boat.now_us, direction=Direction.STOP, reason=Reason.NO_SAFE_SIDE, may_keep_station=True
     )
+    return Inhibit.ADVISED_STOP
+
+
+def stop_by_the_planner(boat: Lockstep) -> Inhibit:
+    boat.planner, boat.evidence = halt, evidence(boat.now_us, water_edge_of(AT_REST))
+    return Inhibit.NO_FREE_PATH
+
+
+def farthest_while_stopped_m(world: World, stop: Callable[[Lockstep], Inhibit], *sets: str) -> float:
+    """How far the boat ever is from where it was [m] in 90 s of a STOP for what lies on the water, or of no path."""
+    boat = Lockstep(world, load_config(sets=(*PERFECT, *sets)))
+    boat.camera = CAMERA
+    from_m, farthest_m, reason = boat.plant.position_m, 0.0, stop(boat)
     for _ in boat.run(90.0):
-        boat.advisory = msgspec.structs.replace(boat.advisory, source_us=boat.now_us)
+        stop(boat)
         farthest_m = max(farthest_m, math.dist(from_m, boat.plant.position_m))
+    assert boat.command is not None
+    assert boat.command.halt_reasons == (reason,)
     boat.plant.close()
     return farthest_m
 
 
 @pytest.mark.parametrize("to_the_bow_rad", [0.0, math.pi, 0.5 * math.pi], ids=["bow first", "stern first", "abeam"])
-def test_a_boat_that_the_advice_stops_does_not_drift_on_to_what_it_stopped_for(to_the_bow_rad: float) -> None:
+@pytest.mark.parametrize("stop", [stop_by_the_advice, stop_by_the_planner])
+def test_a_stopped_boat_does_not_drift_on_to_what_it_stopped_for(
+    stop: Callable[[Lockstep], Inhibit], to_the_bow_rad: float
+) -> None:
     """0.2 m/s of current from any side: in 90 s it is never as far away as one that drifts is in 10 s."""
     lake = open_water("lake")
     current = Current(speed_mps=0.2, toward_rad=lake.start.yaw_rad + to_the_bow_rad)
     streaming = dataclasses.replace(lake, current=current)
     adrift_m, kept_m = (
-        farthest_while_stopped_m(streaming, f"navigator.keep_station={keeps}") for keeps in ("false", "true")
+        farthest_while_stopped_m(streaming, stop, f"navigator.keep_station={keeps}") for keeps in ("false", "true")
     )
     assert adrift_m > 10.0
     assert kept_m < 10.0 / 90.0 * adrift_m

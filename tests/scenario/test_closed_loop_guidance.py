@@ -15,6 +15,7 @@ from paani.messages import (
     Advisory,
     Arming,
     Direction,
+    Evidence,
     GpsFix,
     ImuSample,
     Inhibit,
@@ -28,6 +29,7 @@ from paani.messages import (
     ZeroCause,
 )
 from paani.missions import mission_of_route
+from paani.motion_planning import MotionPlanner
 from paani.thrust_adapter import AppliedThrust, ThrustAdapter
 from paani_services.controller.control import ControllerInputs, ControllerState, compute_thrust
 from paani_services.localization.choice import create_estimator
@@ -64,6 +66,8 @@ class Lockstep:
         self.heading_rad: float | None = None  # takes the place of the navigator's
         self.is_ordered_to_stand = False
         self.armed, self.camera = True, UNCALIBRATED_CAMERA
+        self.planner: MotionPlanner | None = None  # takes the place of the navigator's
+        self.evidence: Evidence | None = None
         self.command: NavCommand | None = None
         self.thrust: Thrust | None = None
         self.odometry: Odometry | None = None
@@ -108,9 +112,10 @@ class Lockstep:
             clock_us=now_us,
             arming=arming,
             arming_us=now_us,
+            evidence=self.evidence,
         )
         self.nav, self.command = navigate(
-            self.nav, inputs, self.mission, now_us, DOMAIN, self.config.navigator, self.camera
+            self.nav, inputs, self.mission, now_us, DOMAIN, self.config.navigator, self.camera, self.planner
         )
         if self.heading_rad is not None:
             self.command = msgspec.structs.replace(self.command, heading_rad=self.heading_rad)

@@ -254,10 +254,10 @@ def test_a_boat_before_a_wall_turns_along_it() -> None:
 def test_a_boat_waits_in_a_dead_end_until_it_opens() -> None:
     pool = Pool((4.0, -30.0, 5.0, 30.0))
     last = pool.settle(50.0)  # it sails along the bar first, slowly
-    assert last.inhibits == (Inhibit.NO_FREE_PATH,)
+    assert last.halt_reasons == (Inhibit.NO_FREE_PATH,)
     assert pool.gap_m() > 0.6
     pool.bars = ()
-    assert pool.settle(21.5).enable
+    assert pool.settle(21.5).speed_mps > 0.0
 
 
 def test_a_boat_under_way_brakes_before_it_gives_up() -> None:
@@ -313,7 +313,8 @@ def test_a_boat_without_room_does_not_pivot_to_look() -> None:
     """The map overrides the advice: cells that the hull would sweep must be free."""
     pool = Pool(bank_m=0.9)
     pool.direction, pool.shut_in = Direction.LEFT, True
-    assert not any(order.enable for order in pool.run(3.0))
+    assert all(order.halt_reasons for order in pool.run(3.0))
+    assert pool.boat == AT_REST
 
 
 def test_with_a_map_an_occupied_side_does_not_delay_the_return() -> None:

@@ -135,9 +135,7 @@ def navigate(
     leg, cross_m = describe_leg(state.progress, mission), setpoint.cross_track_m
     if inhibits:
         state = hold_cross_track(state, now_us)
-        at_station = None
-        if is_planned and config.keep_station and may_keep_station(inhibits, advisory):
-            state, at_station = _keep_station(state, odometry, now_us, config)
+        state, at_station = _keep_station(state, inhibits, inputs, now_us, config) if is_planned else (state, None)
         return state, build_command(state, inputs, now_us, inhibits, at_station=at_station, cross_m=cross_m, leg=leg)
     heading_rad, limit_mps = setpoint.course_rad, speed_limit_mps(advisory)
     speed_mps = min(setpoint.speed_mps, limit_mps)
@@ -170,6 +168,7 @@ def navigate(
     bounded_mps = limit_speed(mission.bounds, odometry, heading_rad, min(speed_mps, limit_mps), config)
     if bounded_mps is None:
         inhibits.append(Inhibit.OUTSIDE_FENCE)
+    state, at_station = _keep_station(state, inhibits, inputs, now_us, config) if is_planned else (state, None)
     return state, build_command(
         state,
         inputs,
@@ -177,6 +176,7 @@ def navigate(
         inhibits,
         heading_rad,
         bounded_mps or 0.0,
+        at_station=at_station,
         cross_m=cross_m,
         leg=leg,
         obstacle_track_ids=state.planner_state.obstacle_track_ids if is_planned else (),
@@ -199,11 +199,14 @@ def begin_step(
 
 
 def _keep_station(
-    state: NavigatorState, odometry: Odometry, now_us: int, config: NavigatorConfig
+    state: NavigatorState, inhibits: list[Inhibit], inputs: NavigatorInputs, now_us: int, config: NavigatorConfig
 ) -> tuple[NavigatorState, StationSetpoint | None]:
-    """The state with the station that is kept, and what holds the boat there; None, so no thrust, without its place."""
-    here = state.planner_state.memory.odom_pose
-    if here is None:
+    """The state with the station that is kept, and what holds the boat there; None, so no thrust, if it may not be."""
+    here, odometry = state.planner_state.memory.odom_pose, inputs.odometry
+    may_hold = config.keep_station and may_keep_station(
+        inhibits, inputs.advisory, is_nobody_near=state.planner_state.is_nobody_near
+    )
+    if here is None or odometry is None or not may_hold:
         return state, None
     here_m = (here.x_m, here.y_m)
     turn_rad = _interrupted_turn_rad(state, odometry.yaw_rad, now_us, config)

@@ -1,4 +1,4 @@
-"""A boat that the advice stops is held where it stopped: when thrust may do so, and what it may do."""
+"""A boat that the advice stops, or that has no path, is held where it stopped: when thrust may do so, and how."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from paani_services.advisor.advise import advise
 from paani_services.advisor.people import may_keep_station, nobody_near_s
 from paani_services.advisor.risk import Obstacle
 from paani_services.controller.control import ControllerInputs, ControllerState, compute_thrust
+from paani_services.navigator.avoidance.rollout import BoatState, GuidanceSetpoint
 from paani_services.navigator.guidance.station_keeping import (
     AT_STATION_M,
     LEAD_S,
@@ -27,11 +28,21 @@ from paani_services.navigator.guidance.station_keeping import (
     hold_station,
     take_station,
 )
+from paani_services.navigator.mapping.dynamic_obstacles import map_water
 from paani_services.navigator.navigate import navigate
-from tests.synthetic_water import CAMERA
+from paani_sim.eye.camera import BoatPose
+from tests.synthetic_water import (
+    CAMERA,
+    PLANNER,
+    detection_of,
+    evidence,
+    observe_then_look_astern,
+    request_on,
+    water_edge_of,
+)
 from tests.unit.paani_services.advisor.advisor_evidence import CALIBRATED, CLEAR, PAPER, play
 from tests.unit.paani_services.advisor.test_people import AHEAD, FRAMES, LEFT, person
-from tests.unit.paani_services.navigator.test_interlocks import MISSION
+from tests.unit.paani_services.navigator.test_interlocks import MISSION, halt, planned
 from tests.unit.paani_services.navigator.test_navigate import NOW_US, RUNNING, advice, inputs, pose
 
 CONTROLLER, NAVIGATOR = load_config().controller, load_config().navigator
@@ -339,3 +350,47 @@ def test_a_boat_that_drifts_is_pushed_back(surge_mps: float) -> None:
 def test_an_order_that_keeps_the_station_and_asks_for_more_is_invalid(changes: dict[str, object]) -> None:
     thrust = thrust_for(msgspec.structs.replace(KEEPING, **changes), ControllerState())
     assert (thrust.enabled, thrust.inhibits) == (False, (Inhibit.COMMAND_INVALID,))
+
+
+def swimmer_at(distance_m: float) -> m.Detection:
+    return detection_of((distance_m - 0.3, -0.3, distance_m + 0.3, 0.3), 0.4)
+
+
+@pytest.mark.parametrize(
+    ("changes", "keeps"),
+    [
+        ({}, True),
+        ({"detections": (swimmer_at(STOP_M + 1.0),)}, True),
+        ({"detections": (swimmer_at(STOP_M),)}, False),
+        ({"usable": False}, False),
+    ],
+    ids=["open water", "somebody far off", "somebody near", "no fit picture"],
+)
+def test_without_a_path_a_picture_of_the_water_with_nobody_near_allows_it(
+    changes: dict[str, object], *, keeps: bool
+) -> None:
+    picture = evidence(NOW_US, water_edge_of(BoatPose(3.0, 0.0, 0.0)), **changes)
+    _, order = planned(halt, evidence=picture)
+    assert (order.enable, order.keeps_station, order.halt_reasons) == (keeps, keeps, (Inhibit.NO_FREE_PATH,))
+    assert order.speed_mps == 0.0
+
+
+def test_without_a_path_and_without_the_setting_there_is_no_thrust() -> None:
+    picture, at = (
+        evidence(NOW_US, water_edge_of(BoatPose(3.0, 0.0, 0.0))),
+        msgspec.structs.replace(pose(3.0, 0.0), surge_mps=0.0),
+    )
+    off = msgspec.structs.replace(NAVIGATOR, keep_station=False)
+    _, order = navigate(RUNNING, inputs(odometry=at, evidence=picture), MISSION, NOW_US, 43, off, CAMERA, halt)
+    assert (order.enable, order.inhibits) == (False, (Inhibit.NO_FREE_PATH,))
+
+
+def test_whoever_was_seen_may_have_swum_nearer_out_of_sight() -> None:
+    """4.7 m off and then astern of the picture: at 0.4 m/s nobody knows after 8 s that they are not within 1.5 m."""
+    distances_m = []
+    for seconds in (3.2, 8.0):
+        memory, now_us = observe_then_look_astern(seconds, swimmer_at(5.0))
+        grid, obstacles = map_water(memory.observations, (0.0, 0.0), now_us, CAMERA, PLANNER)
+        request = request_on(grid, BoatState(0.0, 0.0, 0.0), GuidanceSetpoint(0.0, 0.6), obstacles=obstacles)
+        distances_m.append(request.nearest_person_m())
+    assert distances_m == pytest.approx([4.7 - 1.28, 4.7 - 3.2], abs=0.4)

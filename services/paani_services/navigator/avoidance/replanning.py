@@ -20,6 +20,7 @@ from paani_services.navigator.mapping.observation import ObservationMemory, add_
 from paani_services.navigator.mapping.observed_cells import CELL_M, Camera
 
 COURSE_TOLERANCE_RAD = math.radians(3.0)  # desired courses this near to each other share a plan
+PERSON_NEAR_M = 1.5  # `advisor.people.stop_m`: nobody is so near to fans that turn
 
 
 class PlanBasis(msgspec.Struct, frozen=True, kw_only=True):
@@ -48,6 +49,7 @@ class PlannerState(
     waiting_since_us: since when no plan has led the boat onward.
     obstacle_track_ids: the advisor's tracks of the dynamic obstacles that the plan was made for.
     basis: what the plan was made from; None where another planner made it.
+    is_nobody_near: whether a recent picture showed the water then, and no person might be within `PERSON_NEAR_M`.
     """
 
     memory: ObservationMemory = ObservationMemory()
@@ -59,6 +61,7 @@ class PlannerState(
     frame_id: tuple[int, int] = (-1, -1)
     obstacle_track_ids: tuple[int, ...] = ()
     basis: PlanBasis | None = None
+    is_nobody_near: bool = False
 
 
 def observe(
@@ -118,6 +121,7 @@ def replan(
             state.memory.frame_id,
             tuple(sorted({obstacle.track_id for obstacle in request.obstacles} - {0})),
             basis if planner is None else None,
+            request.grid.is_recent and request.nearest_person_m() >= PERSON_NEAR_M,
         )
     is_escape = state.basis is not None and plan.speed_mps > state.basis.speed_mps
     allowed_mps = max(setpoint.speed_mps, setpoint.escape_mps) if is_escape else setpoint.speed_mps

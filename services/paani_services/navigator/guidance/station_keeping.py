@@ -1,4 +1,4 @@
-"""A boat that the advice stops is kept where it stopped, against wind and current. Pure."""
+"""A boat that the advice stops, or that has no path, is kept where it stopped, against wind and current. Pure."""
 
 import math
 from typing import NamedTuple
@@ -39,8 +39,13 @@ class StationSetpoint(NamedTuple):
     astern_mps: float
 
 
-def may_keep_station(inhibits: list[Inhibit], advisory: Advisory | None) -> bool:
-    """Whether nothing but the advice forbids motion, and the advice allows thrust that holds the boat where it is."""
+def may_keep_station(inhibits: list[Inhibit], advisory: Advisory | None, *, is_nobody_near: bool) -> bool:
+    """Whether thrust may hold the boat where it is: the advice alone stops it and allows that, or the planner alone.
+
+    is_nobody_near: as far as the planner remembers. The advice tells of those whom the picture shows.
+    """
+    if inhibits == [Inhibit.NO_FREE_PATH]:
+        return is_nobody_near
     return inhibits == [Inhibit.ADVISED_STOP] and advisory is not None and advisory.may_keep_station is True
 
 

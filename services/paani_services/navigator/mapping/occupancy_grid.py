@@ -38,6 +38,7 @@ class OccupancyGrid(NamedTuple):
     occluded: occupied, but last seen more than `occupied_s` ago.
     people: occupied by a person, without the room kept around them.
     reachable_unseen: a person or a vessel out of sight may have got there, and no picture shows water there now.
+    possible_people: a person is there, or out of sight may have got there.
     """
 
     west_m: float
@@ -48,6 +49,12 @@ class OccupancyGrid(NamedTuple):
     blind_zone: Bools
     people: Bools
     reachable_unseen: Bools
+    possible_people: Bools
+
+    @property
+    def is_recent(self) -> bool:
+        """Whether a picture of the last `free_s` shows the water, or all of it is in the blind zone."""
+        return bool((self.free | self.blind_zone).any())
 
     @property
     def unknown(self) -> Bools:
@@ -108,17 +115,19 @@ def build_occupancy_grid(
     ages_s[:first_occupied] = [(now_us - observation.stamp_us) * 1e-6 for observation in recent[:first_occupied]]
     swum_m = np.minimum(config.person_mps * ages_s, config.person_reach_m)
     drifted_m = np.minimum(config.drift_mps * ages_s, config.vessel_reach_m)
-    reachable_unseen = _dilate(people_now, swum_m[last_person]) | _dilate(vessels_now, drifted_m[last_vessel])
     shape = (GRID_CELLS, GRID_CELLS)
+    is_shown = free_now.reshape(shape)
+    swum, drifted = _dilate(people_now, swum_m[last_person]), _dilate(vessels_now, drifted_m[last_vessel])
     grid = OccupancyGrid(
         west * CELL_M,
         south * CELL_M,
         occupied=occupied_now.reshape(shape),
         occluded=(occupied_now & (last_occupied < first_occupied)).reshape(shape),
-        free=free_now.reshape(shape),
+        free=is_shown,
         blind_zone=np.zeros(shape, np.bool_),
         people=people_now.reshape(shape),
-        reachable_unseen=reachable_unseen & ~free_now.reshape(shape),
+        possible_people=people_now.reshape(shape) | (swum & ~is_shown),
+        reachable_unseen=(swum | drifted) & ~is_shown,
     )
     if first_free == len(recent):
         return grid

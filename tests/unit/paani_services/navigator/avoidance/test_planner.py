@@ -68,7 +68,15 @@ def round_about(occupied: np.ndarray) -> OccupancyGrid:
     """A grid around the origin where everything that is not occupied is free."""
     none = np.zeros_like(occupied)
     return OccupancyGrid(
-        -10.0, -10.0, occupied, occluded=none, free=~occupied, blind_zone=none, people=none, reachable_unseen=none
+        -10.0,
+        -10.0,
+        occupied,
+        occluded=none,
+        free=~occupied,
+        blind_zone=none,
+        people=none,
+        reachable_unseen=none,
+        possible_people=none,
     )
 
 

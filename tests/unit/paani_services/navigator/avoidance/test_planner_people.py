@@ -85,7 +85,7 @@ def test_a_boat_where_a_person_may_be_goes_on_and_is_not_driven_out(course: floa
     none = np.zeros((GRID_CELLS, GRID_CELLS), np.bool_)
     beside = none.copy()
     beside[35:48, :] = True  # from 0.4 m to starboard
-    free = OccupancyGrid(-10.0, -10.0, none, none, ~none, none, none, none)
+    free = OccupancyGrid(-10.0, -10.0, none, none, ~none, none, none, none, none)
     setpoint = GuidanceSetpoint(course, 0.6)
     seen = plan_on(free._replace(occupied=beside, free=~beside), RESTING, setpoint, None, PLANNER)
     unseen = plan_on(free._replace(reachable_unseen=beside), RESTING, setpoint, None, PLANNER)

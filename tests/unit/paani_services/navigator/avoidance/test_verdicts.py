@@ -32,7 +32,8 @@ def pool(*bars: Bar) -> OccupancyGrid:
 def basin(occupied: np.ndarray, people: np.ndarray | None = None) -> OccupancyGrid:
     """A grid around the origin where everything that is not occupied is free."""
     none = np.zeros_like(occupied)
-    return OccupancyGrid(-10.0, -10.0, occupied, none, ~occupied, none, none if people is None else people, none)
+    seen = none if people is None else people
+    return OccupancyGrid(-10.0, -10.0, occupied, none, ~occupied, none, seen, none, seen)
 
 
 def wall(rows: range = SPAN, columns: range = SPAN) -> np.ndarray:
