@@ -67,17 +67,7 @@ def planned_trajectory(start: BoatState, found: Plan) -> Trajectories:
 def round_about(occupied: np.ndarray) -> OccupancyGrid:
     """A grid around the origin where everything that is not occupied is free."""
     none = np.zeros_like(occupied)
-    return OccupancyGrid(
-        -10.0,
-        -10.0,
-        occupied,
-        occluded=none,
-        free=~occupied,
-        blind_zone=none,
-        people=none,
-        reachable_unseen=none,
-        possible_people=none,
-    )
+    return OccupancyGrid(-10.0, -10.0, occupied, none, ~occupied, none, none, none, none)
 
 
 def bar_on_grid(bar: Bar) -> np.ndarray:

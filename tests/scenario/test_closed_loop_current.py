@@ -1,0 +1,54 @@
+"""The guidance chain in a current that carries the boat on to what lies ahead: it sees that, and never comes to it."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import pytest
+
+from paani.config import load_config
+from paani_sim.eye.camera import BoatPose
+from paani_sim.worlds import Current
+from tests.scenario.test_closed_loop_drift import PERFECT
+from tests.scenario.test_closed_loop_guidance import Lockstep, open_water
+from tests.synthetic_water import CAMERA, Bar, evidence, water_edge_of
+
+HULL_M = [(ahead, port) for ahead in (-0.55, 0.0, 0.55) for port in (-0.35, 0.0, 0.35)]  # points of it, from its middle
+DEAD_END: tuple[Bar, ...] = ((4.0, -4.0, 6.0, 4.0), (-3.0, 4.0, 6.0, 5.0), (-3.0, -5.0, 6.0, -4.0))
+
+
+def gap_m(boat: BoatPose, bars: tuple[Bar, ...]) -> float:
+    """From the hull to the nearest bar."""
+    cos, sin = math.cos(boat.yaw_rad), math.sin(boat.yaw_rad)
+    points = [(boat.x_m + a * cos - p * sin, boat.y_m + a * sin + p * cos) for a, p in HULL_M]
+    return min(
+        math.hypot(max(west - x, 0.0, x - east), max(south - y, 0.0, y - north))
+        for x, y in points
+        for west, south, east, north in bars
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("toward_deg", [-45.0, 0.0, 45.0])
+def test_a_boat_in_a_dead_end_is_not_carried_on_to_what_bars_its_way(toward_deg: float) -> None:
+    """4 m from a wall with arms, 8 m apart, in 0.2 m/s of current; the boat without a path is kept where it is."""
+    lake = open_water("lake")
+    start = lake.start
+    current = Current(speed_mps=0.2, toward_rad=start.yaw_rad + math.radians(toward_deg))
+    boat = Lockstep(dataclasses.replace(lake, current=current), load_config(sets=PERFECT))
+    boat.camera = CAMERA
+    (x0_m, y0_m), cos, sin = boat.plant.position_m, math.cos(start.yaw_rad), math.sin(start.yaw_rad)
+    least_m = math.inf
+    for number, _ in enumerate(boat.run(45.0)):
+        x_m, y_m = boat.plant.position_m
+        east_m, north_m = x_m - x0_m, y_m - y0_m
+        assert boat.odometry is not None
+        here = BoatPose(
+            cos * east_m + sin * north_m, cos * north_m - sin * east_m, boat.odometry.yaw_rad - start.yaw_rad
+        )
+        if number % 2 == 0:
+            boat.evidence = evidence(boat.now_us, water_edge_of(here, DEAD_END))
+        least_m = min(least_m, gap_m(here, DEAD_END))
+    boat.plant.close()
+    assert least_m > 0.2
