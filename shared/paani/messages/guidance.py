@@ -56,8 +56,8 @@ class NavCommand(Message, frozen=True, kw_only=True):
     `obstacle_track_ids`: the advisor's tracks of the dynamic obstacles that the plan in force was made for.
     `astern_mps`: the speed astern that a hand asks for, only where `speed_mps` is 0. `vetoes`: why a hand gets no
     thrust ahead, while it may turn and go astern. `keeps_station`: the advice stops the boat, or it has no path, which
-    `vetoes` names, and it is held where it stopped: `speed_mps` is 0, `astern_mps` at most `STATION_ASTERN_MPS`, back to
-    the place from which it was carried, and the heading is where it is carried to.
+    `vetoes` names, and it is held where it stopped: `speed_mps` is 0, `astern_mps` at most `STATION_ASTERN_MPS`, back
+    to the place from which it was carried, and the heading is where it is carried to.
     """
 
     enable: bool
