@@ -17,6 +17,7 @@ from torch.nn import functional as F
 
 from paani.errors import UserError
 from paani_models.datasets.sources import DETECTOR_CLASSES
+from paani_models.engines.onnx_file import read_onnx
 
 STRIDES = (8, 16, 32)
 HEAD_CHANNELS = 64
@@ -194,10 +195,9 @@ def load_yolox_weights(model: Detector, path: Path) -> None:
     Its colour order and range go into the first convolution, so that the input here is RGB 0..1.
     Raises UserError where the file's convolutions are not those of this net.
     """
-    import onnx  # noqa: PLC0415 - needed for this start only
     from onnx import numpy_helper  # noqa: PLC0415
 
-    graph = onnx.load(str(path)).graph
+    graph = read_onnx(path).graph
     constants = {tensor.name: numpy_helper.to_array(tensor) for tensor in graph.initializer}
     theirs = [[constants[name] for name in node.input[1:3]] for node in graph.node if node.op_type == "Conv"]
     ours = [module for module in model.modules() if isinstance(module, nn.Conv2d)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import prod
 from pathlib import Path
 
-from paani.errors import UserError
+from paani_models.engines.onnx_file import read_onnx
 
 
 def count_multiply_adds(path: Path) -> int | None:
@@ -18,10 +18,7 @@ def count_multiply_adds(path: Path) -> int | None:
         import onnx  # noqa: PLC0415 - not on the board
     except ModuleNotFoundError:
         return None
-    try:
-        graph = onnx.shape_inference.infer_shapes(onnx.load(str(path)), data_prop=True).graph
-    except Exception as error:
-        raise UserError(f"{path}: not a readable ONNX file ({type(error).__name__})") from error
+    graph = onnx.shape_inference.infer_shapes(read_onnx(path), data_prop=True).graph
     weights = {tensor.name: tuple(tensor.dims) for tensor in graph.initializer}
     for node in graph.node:  # a quantised weight reaches its layer through a step of its own
         if node.op_type == "DequantizeLinear" and node.input[0] in weights:

@@ -19,6 +19,7 @@ from paani.whole_file import indented_json, replacement_file
 from paani_models.catalogue import MANIFEST, Model, file_sha256, load_catalogue, read_contract, save_catalogue
 from paani_models.engines.contract_check import MAX_DIFFERENCE
 from paani_models.engines.ncnn_runner import Conversion, NcnnFiles, ncnn_files
+from paani_models.engines.onnx_file import read_onnx
 from paani_models.engines.parity import Inputs, measure_difference
 
 PNNX_LIMIT_S = 600.0
@@ -85,10 +86,7 @@ def _copy_whole(have: Path, place: Path) -> None:
 
 def _run_pnnx(program: str, source: Path, contract: Model, scratch: Path) -> NcnnFiles:
     """Run pnnx in a folder of its own, as it leaves files behind."""
-    try:
-        model = onnx.load(str(source))
-    except Exception as error:
-        raise UserError(f"{source}: not a readable ONNX file ({type(error).__name__})") from error
+    model = read_onnx(source)
     net = scratch / "net.onnx"
     onnx.save(replace_strided_slices(model), str(net))
     shape = ",".join(str(side) for side in contract.input.shape)

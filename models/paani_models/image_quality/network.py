@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import onnx
 import torch
 from onnx import numpy_helper
 from torch import Tensor, nn
 
 from paani.errors import UserError
+from paani_models.engines.onnx_file import read_onnx
 from paani_models.segmenter.shipped_network import ShippedSegmenter, load_imagenet_encoder
 
 INPUT_HEIGHT_PX, INPUT_WIDTH_PX = 120, 160
@@ -71,10 +71,7 @@ def start_from_export(network: ImageQualityNetwork, path: Path) -> None:
 
     Raises UserError where the file is no export of it.
     """
-    try:
-        stored = onnx.load(str(path)).graph.initializer
-    except Exception as error:
-        raise UserError(f"{path}: not a readable ONNX file ({type(error).__name__})") from error
+    stored = read_onnx(path).graph.initializer
     try:
         network.load_state_dict({each.name: torch.tensor(numpy_helper.to_array(each)) for each in stored})
     except RuntimeError as error:

@@ -12,8 +12,8 @@ import onnx
 from onnxruntime.quantization import CalibrationDataReader, CalibrationMethod, QuantFormat, QuantType, quantize_static
 
 from paani.arrays import F32
-from paani.errors import UserError
 from paani.whole_file import replacement_file
+from paani_models.engines.onnx_file import read_onnx
 from paani_models.quantisation.equalisation import equalise_layers
 
 
@@ -72,10 +72,7 @@ def quantise_network(net: Path, target: Path, recipe: QuantisationRecipe, inputs
     inputs: calibration inputs as the network gets them, [1,3,H,W] each. Raises UserError naming a file that is no ONNX
     net.
     """
-    try:
-        model = onnx.load(str(net))
-    except Exception as error:
-        raise UserError(f"{net}: not a readable ONNX file ({type(error).__name__})") from error
+    model = read_onnx(net)
     if recipe.equalised:
         equalise_layers(model)
     model = onnx.shape_inference.infer_shapes(model)

@@ -10,7 +10,6 @@ from __future__ import annotations
 from itertools import pairwise
 from pathlib import Path
 
-import onnx
 import torch
 from onnx import numpy_helper
 from torch import Tensor, nn
@@ -18,6 +17,7 @@ from torch.utils.hooks import RemovableHandle
 
 from paani.errors import UserError
 from paani_models.detector.shipped_network import FOCUS_SHAPE, unfold_focus
+from paani_models.engines.onnx_file import read_onnx
 
 
 def load_exported(model: nn.Module, path: Path, pictures: Tensor) -> None:
@@ -54,10 +54,7 @@ def _find_fixed_weights(model: nn.Module) -> frozenset[str]:
 
 def _read_convolutions(path: Path, fixed: frozenset[str]) -> list[tuple[Tensor, Tensor]]:
     """Weight and bias of each convolution but those with a fixed weight, in the file's order."""
-    try:
-        graph = onnx.load(str(path)).graph
-    except Exception as error:
-        raise UserError(f"{path}: not a readable ONNX file ({type(error).__name__})") from error
+    graph = read_onnx(path).graph
     constants = {tensor.name: numpy_helper.to_array(tensor) for tensor in graph.initializer}
     pairs = []
     for node in graph.node:

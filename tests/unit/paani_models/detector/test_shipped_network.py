@@ -1,11 +1,14 @@
 """Output layout, class order and scores of the shipped detector (C1, C2, C4)."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 torch = pytest.importorskip("torch", reason="needs the extra paani[train]")
 
 
+from paani.errors import UserError  # noqa: E402
 from paani_models.datasets.sources import DETECTOR_CLASSES  # noqa: E402
 from paani_models.detector import shipped_network as detector  # noqa: E402
 
@@ -56,3 +59,12 @@ def test_candidate_grid_matches_the_output_order() -> None:
     assert centres[41].tolist() == [12.0, 12.0]
     assert centres[1280].tolist() == [8.0, 8.0]
     assert [int((strides == s).sum()) for s in detector.STRIDES] == [1280, 320, 80]
+
+
+@pytest.mark.parametrize(
+    ("content", "wrong"), [(b"junk", "not a readable ONNX file"), (b"", r"0 convolutions, expected \d+")]
+)
+def test_a_start_from_what_is_no_such_net_names_the_file(tmp_path: Path, content: bytes, wrong: str) -> None:
+    (tmp_path / "start.onnx").write_bytes(content)
+    with pytest.raises(UserError, match=rf"start\.onnx: {wrong}"):
+        detector.load_yolox_weights(detector.Detector(), tmp_path / "start.onnx")
