@@ -15,10 +15,9 @@ def count_multiply_adds(path: Path) -> int | None:
     ONNX.
     """
     try:
-        import onnx  # noqa: PLC0415 - not on the board
+        graph = read_onnx(path, with_shapes=True).graph
     except ModuleNotFoundError:
         return None
-    graph = onnx.shape_inference.infer_shapes(read_onnx(path), data_prop=True).graph
     weights = {tensor.name: tuple(tensor.dims) for tensor in graph.initializer}
     for node in graph.node:  # a quantised weight reaches its layer through a step of its own
         if node.op_type == "DequantizeLinear" and node.input[0] in weights:

@@ -11,11 +11,16 @@ if TYPE_CHECKING:
     from onnx import ModelProto
 
 
-def read_onnx(path: Path) -> ModelProto:
-    """The net in a file. Raises UserError naming a file that is not ONNX; ModuleNotFoundError without onnx."""
+def read_onnx(path: Path, *, with_shapes: bool = False) -> ModelProto:
+    """The net in a file, with the shapes inside it or as it is.
+
+    Raises UserError naming a file that is not ONNX, or whose shapes cannot be inferred; ModuleNotFoundError without
+    onnx.
+    """
     import onnx  # noqa: PLC0415 - not on the board
 
     try:
-        return onnx.load(str(path))
+        model = onnx.load(str(path))
+        return onnx.shape_inference.infer_shapes(model, data_prop=True) if with_shapes else model
     except Exception as error:
         raise UserError(f"{path}: not a readable ONNX file ({type(error).__name__})") from error
