@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -31,6 +32,12 @@ Bar = tuple[float, float, float, float]  # west, south, east, north [m] of an ob
 FAR_M = 500.0
 AT_REST, EMPTY_MEMORY = BoatPose(0.0, 0.0, 0.0), ObservationMemory()
 ASTERN = BoatPose(0.0, 0.0, 2.5)  # the camera looks away from what lies ahead
+
+
+def distance_to_bar_m(x_m: float, y_m: float, bar: Bar) -> float:
+    """From a place to the nearest point of a bar; 0 inside it."""
+    west, south, east, north = bar
+    return math.hypot(max(west - x_m, 0.0, x_m - east), max(south - y_m, 0.0, y_m - north))
 
 
 def water_edge_of(boat: BoatPose, bars: tuple[Bar, ...] = (), bank_m: float = FAR_M) -> tuple[float, ...]:

@@ -12,7 +12,7 @@ from paani_sim.eye.camera import BoatPose
 from paani_sim.worlds import Current
 from tests.scenario.test_closed_loop_drift import PERFECT
 from tests.scenario.test_closed_loop_guidance import Lockstep, open_water
-from tests.synthetic_water import CAMERA, Bar, evidence, water_edge_of
+from tests.synthetic_water import CAMERA, Bar, distance_to_bar_m, evidence, water_edge_of
 
 HULL_M = [(ahead, port) for ahead in (-0.55, 0.0, 0.55) for port in (-0.35, 0.0, 0.35)]  # points of it, from its middle
 DEAD_END: tuple[Bar, ...] = ((4.0, -4.0, 6.0, 4.0), (-3.0, 4.0, 6.0, 5.0), (-3.0, -5.0, 6.0, -4.0))
@@ -22,11 +22,7 @@ def gap_m(boat: BoatPose, bars: tuple[Bar, ...]) -> float:
     """From the hull to the nearest bar."""
     cos, sin = math.cos(boat.yaw_rad), math.sin(boat.yaw_rad)
     points = [(boat.x_m + a * cos - p * sin, boat.y_m + a * sin + p * cos) for a, p in HULL_M]
-    return min(
-        math.hypot(max(west - x, 0.0, x - east), max(south - y, 0.0, y - north))
-        for x, y in points
-        for west, south, east, north in bars
-    )
+    return min(distance_to_bar_m(x_m, y_m, bar) for x_m, y_m in points for bar in bars)
 
 
 @pytest.mark.slow

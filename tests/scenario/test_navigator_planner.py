@@ -37,7 +37,7 @@ from paani_services.navigator.mapping.observed_cells import Camera
 from paani_services.navigator.mapping.occupancy_grid import UNCALIBRATED_CAMERA
 from paani_services.navigator.navigate import NavigatorState, navigate
 from paani_sim.eye.camera import BoatPose
-from tests.synthetic_water import AT_REST, CAMERA, START_US, Bar, evidence, odometry, water_edge_of
+from tests.synthetic_water import AT_REST, CAMERA, START_US, Bar, distance_to_bar_m, evidence, odometry, water_edge_of
 
 CONFIG = load_config().navigator
 PAPER = load_config(profile="paper").navigator
@@ -105,15 +105,7 @@ class Pool:
 
     def gap_m(self) -> float:
         """From the boat's middle to the nearest bar."""
-        return min(
-            (
-                math.hypot(
-                    max(w - self.boat.x_m, 0.0, self.boat.x_m - e), max(s - self.boat.y_m, 0.0, self.boat.y_m - n)
-                )
-                for w, s, e, n in self.bars
-            ),
-            default=math.inf,
-        )
+        return min((distance_to_bar_m(self.boat.x_m, self.boat.y_m, bar) for bar in self.bars), default=math.inf)
 
 
 def test_open_water_is_sailed_as_without_a_planner() -> None:

@@ -135,7 +135,7 @@ def navigate(
     leg, cross_m = describe_leg(state.progress, mission), setpoint.cross_track_m
     if inhibits:
         state = hold_cross_track(state, now_us)
-        state, at_station = _keep_station(state, inhibits, inputs, now_us, config) if is_planned else (state, None)
+        state, at_station = _keep_station(state, inhibits, inputs, now_us, config, camera)
         return state, build_command(state, inputs, now_us, inhibits, at_station=at_station, cross_m=cross_m, leg=leg)
     heading_rad, limit_mps = setpoint.course_rad, speed_limit_mps(advisory)
     speed_mps = min(setpoint.speed_mps, limit_mps)
@@ -168,7 +168,7 @@ def navigate(
     bounded_mps = limit_speed(mission.bounds, odometry, heading_rad, min(speed_mps, limit_mps), config)
     if bounded_mps is None:
         inhibits.append(Inhibit.OUTSIDE_FENCE)
-    state, at_station = _keep_station(state, inhibits, inputs, now_us, config) if is_planned else (state, None)
+    state, at_station = _keep_station(state, inhibits, inputs, now_us, config, camera)
     return state, build_command(
         state,
         inputs,
@@ -199,14 +199,19 @@ def begin_step(
 
 
 def _keep_station(
-    state: NavigatorState, inhibits: list[Inhibit], inputs: NavigatorInputs, now_us: int, config: NavigatorConfig
+    state: NavigatorState,
+    inhibits: list[Inhibit],
+    inputs: NavigatorInputs,
+    now_us: int,
+    config: NavigatorConfig,
+    camera: Camera,
 ) -> tuple[NavigatorState, StationSetpoint | None]:
     """The state with the station that is kept, and what holds the boat there; None, so no thrust, if it may not be."""
     here, odometry = state.planner_state.memory.odom_pose, inputs.odometry
-    may_hold = config.keep_station and may_keep_station(
-        inhibits, inputs.advisory, is_nobody_near=state.planner_state.is_nobody_near
-    )
-    if here is None or odometry is None or not may_hold:
+    is_asked_for = config.keep_station and config.planner.acts_on(camera.calibration)
+    if here is None or odometry is None or not is_asked_for:
+        return state, None
+    if not may_keep_station(inhibits, inputs.advisory, is_nobody_near=state.planner_state.is_nobody_near):
         return state, None
     here_m = (here.x_m, here.y_m)
     turn_rad = _interrupted_turn_rad(state, odometry.yaw_rad, now_us, config)

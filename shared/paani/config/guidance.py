@@ -80,7 +80,7 @@ class NavigatorConfig(Section, frozen=True):
     arming_max_age_s: Positive = 1.0  # five periods of the operator's arming message
     order_max_age_s: Positive = 1.0  # of the mode ordered, ten periods of it; then no thrust
     stick_max_age_s: Positive = 0.4  # of what a hand says in MANUAL; then no thrust
-    # Where the advice stops it, or no path is free, and nobody is near, thrust holds the boat against wind and current.
+    # Where the advice or the lack of a path stops it and nobody is near, thrust holds the boat; the planner's alone.
     keep_station: bool = True
     hold_radius_m: Positive = 4.0  # of the station of HOLD and RETURN, on which there is no thrust
     manual_turn_deg: Positive = 28.0  # off the bow at full stick: of the controller's gain, its most steering

@@ -376,10 +376,8 @@ def test_without_a_path_a_picture_of_the_water_with_nobody_near_allows_it(
 
 
 def test_without_a_path_and_without_the_setting_there_is_no_thrust() -> None:
-    picture, at = (
-        evidence(NOW_US, water_edge_of(BoatPose(3.0, 0.0, 0.0))),
-        msgspec.structs.replace(pose(3.0, 0.0), surge_mps=0.0),
-    )
+    picture = evidence(NOW_US, water_edge_of(BoatPose(3.0, 0.0, 0.0)))
+    at = msgspec.structs.replace(pose(3.0, 0.0), surge_mps=0.0)
     off = msgspec.structs.replace(NAVIGATOR, keep_station=False)
     _, order = navigate(RUNNING, inputs(odometry=at, evidence=picture), MISSION, NOW_US, 43, off, CAMERA, halt)
     assert (order.enable, order.inhibits) == (False, (Inhibit.NO_FREE_PATH,))

@@ -6,10 +6,9 @@ from collections.abc import Sequence
 import msgspec
 import numpy as np
 
-from paani.arrays import F64
 from paani.config import PlannerConfig
 from paani.messages import Label
-from paani_services.navigator.avoidance.clearance import position_deviation_m
+from paani_services.navigator.avoidance.clearance import predicted_clearance_m
 from paani_services.navigator.avoidance.rollout import BoatState, GuidanceSetpoint, Plan
 from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle
 from paani_services.navigator.mapping.observed_cells import CELL_M
@@ -41,17 +40,12 @@ class PlanRequest(msgspec.Struct, frozen=True, kw_only=True):
         rows, columns = np.nonzero(self.grid.possible_people)
         east_m = np.asarray(self.grid.west_m + (columns + 0.5) * CELL_M)
         north_m = np.asarray(self.grid.south_m + (rows + 0.5) * CELL_M)
-        people = [each for each in self.obstacles if each.label is Label.PERSON]
-        return min(
-            self._distance_m(east_m, north_m),
-            *(self._distance_m(each.east_m, each.north_m) - float(position_deviation_m(each, 0.0)) for each in people),
-            math.inf,
-        )
-
-    def _distance_m(self, east_m: F64, north_m: F64) -> float:
-        """From the boat's middle to the nearest of these places; infinite without one."""
         off_east_m, off_north_m = east_m - self.start.x_m, north_m - self.start.y_m
-        return math.sqrt(float((off_east_m * off_east_m + off_north_m * off_north_m).min(initial=math.inf)))
+        square_m2 = float((off_east_m * off_east_m + off_north_m * off_north_m).min(initial=math.inf))
+        x_m, y_m, now_s = np.array([self.start.x_m]), np.array([self.start.y_m]), np.zeros(1)
+        people = [each for each in self.obstacles if each.label is Label.PERSON]
+        outlines_m = [float(predicted_clearance_m(each, x_m, y_m, now_s)[0]) + each.standoff_m for each in people]
+        return min(math.sqrt(square_m2), *outlines_m, math.inf)
 
     @property
     def predicted_obstacles(self) -> list[DynamicObstacle]:
