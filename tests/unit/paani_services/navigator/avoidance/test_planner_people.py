@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 
 from paani.messages import Detection, Label
-from paani_services.navigator.avoidance.clearance import clearance_fields_m
+from paani_services.navigator.avoidance.clearance import UNSEEN_GROWTH_MPS, clearance_fields_m
 from paani_services.navigator.avoidance.rollout import BoatState, GuidanceSetpoint
+from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle
 from paani_services.navigator.mapping.observation import ObservationMemory
 from paani_services.navigator.mapping.observed_cells import CELL_M
 from paani_services.navigator.mapping.occupancy_grid import GRID_CELLS, OccupancyGrid, build_occupancy_grid
+from paani_services.navigator.mapping.velocity_fit import Velocity
 from paani_sim.eye.camera import BoatPose
 from tests.synthetic_water import (
     AT_REST,
@@ -21,7 +23,9 @@ from tests.synthetic_water import (
     detection_of,
     observe_from,
     observe_then_look_astern,
+    open_water,
     plan_on,
+    request_on,
     water_edge_of,
 )
 
@@ -153,3 +157,13 @@ def test_a_swimmer_in_the_empty_corner_of_an_aslant_hull_s_box_is_in_the_water()
         -1
     ]
     assert any(foot.is_person for foot in observation.feet)
+
+
+def test_who_swims_in_sight_is_as_near_as_one_standard_deviation_makes_them() -> None:
+    """A person who moves is not on the grid; the room that a plan keeps around them is not what counts here."""
+    swims = Velocity(0.0, 0.4, 0.3)
+    outline = (np.array([2.0, 3.0]), np.array([0.0, 0.0]))
+    for label, distance_m in ((Label.PERSON, 2.0 - 2.0 * (0.3 + UNSEEN_GROWTH_MPS)), (Label.VESSEL, np.inf)):
+        swimmer = DynamicObstacle(*outline, 0.5, swims, 2.0, frozenset(), 0, label)
+        request = request_on(open_water(), RESTING, GuidanceSetpoint(0.0, 0.6), obstacles=[swimmer])
+        assert request.nearest_person_m() == pytest.approx(distance_m)
