@@ -155,6 +155,12 @@ def static_distances_m(grid: OccupancyGrid, trajectories: Trajectories) -> np.nd
     return gaps_m
 
 
+def pool(*bars: Bar, bank_m: float = 500.0) -> OccupancyGrid:
+    """The grid of a boat at the origin that has just taken a picture along x."""
+    memory = observe_from(edge=water_edge_of(AT_REST, bars, bank_m))
+    return build_occupancy_grid(memory.observations, (0.0, 0.0), START_US, CAMERA, PLANNER)
+
+
 def request_on(
     grid: OccupancyGrid,
     start: BoatState,

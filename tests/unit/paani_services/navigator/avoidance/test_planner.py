@@ -37,6 +37,7 @@ from tests.synthetic_water import (
     Bar,
     observe_from,
     plan_on,
+    pool,
     static_distances_m,
     water_edge_of,
 )
@@ -44,12 +45,6 @@ from tests.synthetic_water import (
 PAPER = load_config(profile="paper").navigator.planner
 AHEAD = GuidanceSetpoint(0.0, 0.6)
 RESTING, CRUISING = BoatState(0.0, 0.0, 0.0), BoatState(0.0, 0.0, 0.0, 0.6)
-
-
-def pool(*bars: Bar, bank_m: float = 500.0) -> OccupancyGrid:
-    """The grid of a boat at the origin that has just taken a picture along x."""
-    memory = observe_from(edge=water_edge_of(AT_REST, bars, bank_m))
-    return build_occupancy_grid(memory.observations, (0.0, 0.0), START_US, CAMERA, PLANNER)
 
 
 def swept_gap_m(grid: OccupancyGrid, start: BoatState, found: Plan) -> tuple[np.ndarray, np.ndarray]:

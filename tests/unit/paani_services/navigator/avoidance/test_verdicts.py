@@ -14,19 +14,13 @@ from paani.geometry import wrap_rad
 from paani.messages import Constraint, HeadingVerdict
 from paani_services.navigator.avoidance.rollout import BoatState, GuidanceSetpoint, Plan
 from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle
-from paani_services.navigator.mapping.occupancy_grid import GRID_CELLS, OccupancyGrid, build_occupancy_grid
+from paani_services.navigator.mapping.occupancy_grid import GRID_CELLS, OccupancyGrid
 from paani_services.navigator.mapping.velocity_fit import Velocity
-from tests.synthetic_water import AT_REST, CAMERA, PLANNER, START_US, Bar, explain_motion, observe_from, water_edge_of
+from tests.synthetic_water import PLANNER, explain_motion, pool
 
 CRUISING, RESTING = BoatState(0.0, 0.0, 0.0, 0.6), BoatState(0.0, 0.0, 0.0)
 AHEAD = GuidanceSetpoint(0.0, 0.6)
 SPAN = range(GRID_CELLS)
-
-
-def pool(*bars: Bar) -> OccupancyGrid:
-    """The grid of a boat at the origin that has just taken a picture along x."""
-    memory = observe_from(edge=water_edge_of(AT_REST, bars))
-    return build_occupancy_grid(memory.observations, (0.0, 0.0), START_US, CAMERA, PLANNER)
 
 
 def basin(occupied: np.ndarray, people: np.ndarray | None = None) -> OccupancyGrid:
