@@ -11,11 +11,11 @@ import msgspec
 import numpy as np
 
 from paani.errors import UserError
-from paani_sim.trials.conditions import traffic_of, with_condition
+from paani_sim.trials.conditions import TRAFFIC, parse_setting, traffic_of, with_condition
 from paani_sim.trials.policies import Policy
 from paani_sim.trials.seed_parts import SeedChoice, list_seeds
 from paani_sim.worlds import WORLDS, Fault, FaultKind, Scenario
-from paani_sim.worlds.generate import AS_DRAWN, draw_random_scenario
+from paani_sim.worlds.generate import draw_random_scenario
 from paani_sim.worlds.imazu import IMAZU_SCENARIOS
 from paani_sim.worlds.load import SCENARIOS, load_scenario
 
@@ -155,7 +155,7 @@ def parse_case(text: str) -> TrialCase:
 
 def _require_sweepable(world: str, swept: str) -> None:
     """Raises UserError for a condition that is none, or that says what is met in a scenario where that is written."""
-    if traffic_of(swept) != AS_DRAWN and is_fixed_scenario(world):
+    if swept and parse_setting(swept)[0] in TRAFFIC and is_fixed_scenario(world):
         raise UserError(f"--sweep {swept}: {world} says itself what is met")
 
 

@@ -116,6 +116,7 @@ def test_the_figures_of_a_sweep_are_by_policy_and_value() -> None:
         (("--sweep", "people_factor=1.5"), "people_factor is a whole number"),
         (("--one", "imazu-01@encounters=2:1:paani"), "imazu-01 says itself what is met"),
         (("--scenario", "imazu-01", "--sweep", "people_factor=2"), "imazu-01 says itself what is met"),
+        (("--scenario", "imazu-01", "--sweep", "people_factor=1"), "imazu-01 says itself what is met"),
     ],
 )
 def test_a_sweep_that_is_none_is_refused(
