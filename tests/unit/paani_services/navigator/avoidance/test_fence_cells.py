@@ -14,9 +14,8 @@ from paani.messages import FenceArea, Keep, Waypoint
 from paani_services.navigator.avoidance.fence_cells import apply_fence
 from paani_services.navigator.avoidance.replanning import PlannerState, replan
 from paani_services.navigator.avoidance.rollout import BoatState, GuidanceSetpoint, Plan
-from paani_services.navigator.mapping.observation import ObservationMemory
 from paani_services.navigator.mapping.observed_cells import CELL_M
-from paani_services.navigator.mapping.occupancy_grid import GRID_CELLS, OccupancyGrid, build_occupancy_grid
+from paani_services.navigator.mapping.occupancy_grid import GRID_CELLS
 from tests.synthetic_water import (
     AT_REST,
     CAMERA,
@@ -26,6 +25,7 @@ from tests.synthetic_water import (
     observe_from,
     odometry,
     plan_on,
+    pool,
     water_edge_of,
 )
 
@@ -40,14 +40,6 @@ def area(keep: Keep, *corners: tuple[float, float]) -> FenceArea:
 
 def box(keep: Keep, x1: float, y1: float, x2: float, y2: float) -> FenceArea:
     return area(keep, (x1, y1), (x2, y1), (x2, y2), (x1, y2))
-
-
-def memory_of(*bars: Bar) -> ObservationMemory:
-    return observe_from(edge=water_edge_of(AT_REST, bars, 500.0))
-
-
-def pool(*bars: Bar) -> OccupancyGrid:
-    return build_occupancy_grid(memory_of(*bars).observations, (0.0, 0.0), START_US, CAMERA, PLANNER)
 
 
 POINT = st.tuples(st.floats(-12.0, 12.0), st.floats(-12.0, 12.0))
@@ -99,11 +91,11 @@ def test_an_obstacle_is_passed_on_the_side_that_the_fence_leaves(side: float) ->
 
 def test_the_boat_stops_where_the_fence_leaves_no_candidate() -> None:
     """On the same water without the fence it does not stop."""
-    at_rest = odometry(START_US, AT_REST)
+    at_rest, memory = odometry(START_US, AT_REST), observe_from(edge=water_edge_of(AT_REST, bank_m=500.0))
     fence = (box(Keep.IN, -1.0, -1.0, 1.6, 1.0),)
 
     def ordered(within: tuple[FenceArea, ...]) -> Plan:
-        return replan(PlannerState(memory_of()), at_rest, AHEAD, START_US, CAMERA, PLANNER, within)[1]
+        return replan(PlannerState(memory), at_rest, AHEAD, START_US, CAMERA, PLANNER, within)[1]
 
     assert ordered(()).speed_mps > 0.0
     assert ordered(fence).speed_mps == 0.0
