@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import signal
-import threading
 from pathlib import Path
 
 import msgspec
@@ -18,7 +17,7 @@ from paani.logs.folder import recordings
 from paani.logs.reader import Log, open_log
 from tests.integration.test_up import READY_S, Up, words_of
 
-DRIVE_S = 4.0
+DRIVEN_S = 60.0
 pytestmark = [pytest.mark.integration, pytest.mark.timeout(180)]
 
 
@@ -26,16 +25,30 @@ def first(log: Log, topic: str) -> bytes:
     return next(log.records([topic])).data
 
 
+def thrust_of(log: Log) -> list[m.ThrustApplied]:
+    return [
+        msgspec.json.decode(record.data, type=m.ThrustApplied) for record in log.records([keys.THRUST_APPLIED.name])
+    ]
+
+
+def has_driven(folder: Path, files: int) -> bool:
+    """Whether the newest of that many files shows thrust in force; it is still written to."""
+    found = recordings(folder)
+    if len(found) < files or not found[-1].size_bytes:
+        return False
+    return any(one.zero_cause is m.ZeroCause.NONE for one in thrust_of(open_log(found[-1].path)))
+
+
 def test_a_drive_is_recorded_and_a_dead_recorder_stops_nothing(tmp_path: Path, private_sets: tuple[str, ...]) -> None:
     """The recorder is killed on the way: thrust goes on, a new file begins, the old one is mended."""
     folder, file = tmp_path / "drive", tmp_path / "s.json"
-    up = Up(
-        tmp_path, *words_of(private_sets, "--headless", "--record", str(folder), "--for", "12", "--summary", str(file))
-    )
+    up = Up(tmp_path, *words_of(private_sets, "--headless", "--record", str(folder), "--summary", str(file)))
     up.until(lambda: "processes alive after" in up.out, READY_S)
-    threading.Event().wait(DRIVE_S)
+    up.until(lambda: has_driven(folder, files=1), DRIVEN_S)
     os.kill(up.children()["recorder"], signal.SIGKILL)
     up.until(lambda: "recorder is back" in up.out, 30.0)
+    up.until(lambda: has_driven(folder, files=2), DRIVEN_S)
+    up.process.send_signal(signal.SIGINT)
     assert up.process.wait(60) == 0, (up.out, up.errors)
     assert up.children() == {}
     services = json.loads(file.read_text())["services"]
@@ -45,11 +58,7 @@ def test_a_drive_is_recorded_and_a_dead_recorder_stops_nothing(tmp_path: Path, p
     for service in keys.DECIDING_SERVICES:
         step = msgspec.json.decode(first(before, f"{service}/step"), type=m.Step)
         assert (step.seq, bool(step.state)) == (0, True), "from its first step everything can be computed again"
-    applied = [
-        msgspec.json.decode(record.data, type=m.ThrustApplied)
-        for log in (before, after)
-        for record in log.records([keys.THRUST_APPLIED.name])
-    ]
+    applied = [*thrust_of(before), *thrust_of(after)]
     driven = [one for one in applied if one.zero_cause is m.ZeroCause.NONE]
     assert driven[0].sent_us < before.end_us < after.start_us < driven[-1].sent_us
     assert all(one.lost_pulse != "recorder" for one in applied)
