@@ -26,6 +26,7 @@ from paani import messages as m
 from paani.logs.reader import Log, open_log
 from tests.conftest import find_free_port
 from tests.integration.test_up import READY_S, Up, words_of
+from tests.unit.paani.logs.small_logs import recorded
 
 pytest.importorskip("foxglove", reason="the extra foxglove is not installed")
 pytest.importorskip("foxglove_schemas_protobuf", reason="foxglove-schemas-protobuf is not installed")
@@ -154,10 +155,6 @@ def drive(tmp_path_factory: pytest.TempPathFactory) -> tuple[Viewer, Log]:
 def dated(layers: Iterable[int], pictures: Sequence[int]) -> set[int]:
     """The layers' pictures [us]; those from before the viewer's first picture left out, as it came between the two."""
     return {source_us for source_us in layers if source_us >= min(pictures)}
-
-
-def recorded(log: Log, topic: keys.Topic[Any]) -> list[Any]:
-    return [msgspec.json.decode(record.data, type=topic.type) for record in log.records([topic.name])]
 
 
 def test_pictures_decode_and_are_those_of_the_bus(drive: tuple[Viewer, Log]) -> None:

@@ -16,6 +16,7 @@ from paani.config import load_config
 from paani.logs.folder import recordings
 from paani.logs.reader import Log, open_log
 from tests.integration.test_up import READY_S, Up, words_of
+from tests.unit.paani.logs.small_logs import recorded
 
 DRIVEN_S = 60.0
 pytestmark = [pytest.mark.integration, pytest.mark.timeout(180)]
@@ -25,18 +26,12 @@ def first(log: Log, topic: str) -> bytes:
     return next(log.records([topic])).data
 
 
-def thrust_of(log: Log) -> list[m.ThrustApplied]:
-    return [
-        msgspec.json.decode(record.data, type=m.ThrustApplied) for record in log.records([keys.THRUST_APPLIED.name])
-    ]
-
-
 def has_driven(folder: Path, files: int) -> bool:
     """Whether the newest of that many files shows thrust in force; it is still written to."""
     found = recordings(folder)
     if len(found) < files or not found[-1].size_bytes:
         return False
-    return any(one.zero_cause is m.ZeroCause.NONE for one in thrust_of(open_log(found[-1].path)))
+    return any(one.zero_cause is m.ZeroCause.NONE for one in recorded(open_log(found[-1].path), keys.THRUST_APPLIED))
 
 
 def test_a_drive_is_recorded_and_a_dead_recorder_stops_nothing(tmp_path: Path, private_sets: tuple[str, ...]) -> None:
@@ -58,7 +53,7 @@ def test_a_drive_is_recorded_and_a_dead_recorder_stops_nothing(tmp_path: Path, p
     for service in keys.DECIDING_SERVICES:
         step = msgspec.json.decode(first(before, f"{service}/step"), type=m.Step)
         assert (step.seq, bool(step.state)) == (0, True), "from its first step everything can be computed again"
-    applied = [*thrust_of(before), *thrust_of(after)]
+    applied = [one for log in (before, after) for one in recorded(log, keys.THRUST_APPLIED)]
     driven = [one for one in applied if one.zero_cause is m.ZeroCause.NONE]
     assert driven[0].sent_us < before.end_us < after.start_us < driven[-1].sent_us
     assert all(one.lost_pulse != "recorder" for one in applied)

@@ -1,4 +1,4 @@
-"""Small recordings, written by the recorder's own writer."""
+"""Small recordings, written by the recorder's own writer, and what a log holds."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import msgspec
 from paani import keys
 from paani import messages as m
 from paani.config import Config, encode_config
+from paani.logs.reader import Log
 from paani.logs.writer import About, LogWriter, read_head
 
 START_US = 1_700_000_000_000_000
@@ -75,3 +76,8 @@ def unfinished(folder: Path, n: int = 60, flush_every: int = 10, name: str = NAM
     fill(log, n, flush_every)
     log.abandon()
     return log.path
+
+
+def recorded(log: Log, topic: keys.Topic[Any]) -> list[Any]:
+    """Every message of a topic that a log holds, in order."""
+    return [msgspec.json.decode(record.data, type=topic.type) for record in log.records([topic.name])]
