@@ -35,6 +35,7 @@ OVERLAP_PX = """(() => {
   const [text, speed] = ["#advice-reason", "#speed"].map((id) => document.querySelector(id).getBoundingClientRect());
   return Math.min(text.right - speed.left, text.bottom - speed.top);
 })()"""
+STALE = "document.querySelector('#{}-device').classList.contains('stale')"
 FACTS = "(name) => document.querySelector(`#${name}-facts`).textContent"
 
 
@@ -90,6 +91,5 @@ async def test_a_hulls_devices_and_its_battery(
             assert await page.evaluate(OVERLAP_PX) <= 0, "advice and readouts stand side by side or one above the other"
             assert await page.evaluate(NARROW) == [], "a value has the room of a word"
         is_reporting = False
-        await until(page, "document.querySelector('#thrusters-device').classList.contains('stale')")
-        assert not await page.evaluate("document.querySelector('#bridge-device').classList.contains('stale')")
+        await until(page, f"{STALE.format('thrusters')} && !{STALE.format('bridge')}")
         assert watched.errors == []
