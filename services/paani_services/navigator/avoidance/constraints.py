@@ -149,13 +149,16 @@ def unless_clearer_than_coasting(evaluation: CandidateEvaluation, hard: Refusals
     """NO_ESCAPE: all whose least clearance is not above that of coasting and nearly the best of all; none too fast.
 
     A boat with its thrusters off is carried on by its own way, wind and current. What may be somewhere is not fled from
-    into what is there: of static obstacles a way out keeps hull and least margin clear, or as much as coasting does.
+    into what is there: of static obstacles a way out keeps hull and least margin clear, or as much as the boat does
+    now, or nearly the most that any candidate or coasting does, where all bring it nearer.
     """
     least = margins(evaluation.request.config)[-1]
-    floor_m = min(evaluation.coasting_static_m - 0.5 * ESCAPE_GAIN_M, least.hull_radius_m + least.margin_m)
     hard = {**hard, Constraint.TOO_FAST: hard[Constraint.TOO_FAST] | evaluation.is_full_speed}
+    static_m = np.where(evaluation.is_in_horizon, evaluation.static_clearance_m, np.inf).min(axis=0)
+    most_m = float(static_m[~any_refusal(hard)].max(initial=evaluation.coasting_static_m))
+    kept_m = min(float(evaluation.static_clearance_m[0, 0]), most_m) - 0.5 * ESCAPE_GAIN_M
+    into_static = static_m < min(kept_m, least.hull_radius_m + least.margin_m)
     clearance_m = np.where(evaluation.is_in_horizon, evaluation.clearance_m, np.inf)
-    into_static = ((evaluation.static_clearance_m < floor_m) & evaluation.is_in_horizon).any(axis=0)
     least_m = np.where(any_refusal(hard) | into_static, -np.inf, clearance_m.min(axis=0))
     enough_m = max(evaluation.coasting_clearance_m + ESCAPE_GAIN_M, float(least_m.max()) - 0.5 * ESCAPE_GAIN_M)
     return {**hard, Constraint.NO_ESCAPE: least_m < enough_m}
