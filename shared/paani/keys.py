@@ -174,6 +174,10 @@ IMU = Topic(
     name="sensors/imu", type=m.ImuSample, producer="plant", rate_hz=100.0, fresh_s=0.2,
     stance=Stance.EVENT, summary="body rates, specific force, and orientation where there is one",
 )
+AIS = Topic(
+    name="sensors/ais", type=m.AisVessels, producer="plant", rate_hz=1.0, fresh_s=3.0,
+    stance=Stance.STATE, summary="vessels that tell their position by AIS, as the receiver heard them",
+)
 THRUST_APPLIED = Topic(
     name="plant/thrust_applied", type=m.ThrustApplied, producer="plant", rate_hz=20.0, fresh_s=0.5,
     stance=Stance.STATE, summary="what the thrust adapter applies, and why not",
@@ -248,7 +252,7 @@ ASKED: tuple[Topic[Any], ...] = (*REQUESTS.values(), *MISSION_REQUESTS.values(),
 TOPICS: tuple[Topic[Any], ...] = (
     PICTURE, RENDERED, MASK, EVIDENCE, TRACKS, ADVISORY, COMMAND, ROUTE, MISSION, PREDICTION, OCCUPANCY, THRUST,
     LOCAL_ODOMETRY, ODOMETRY, ARMING, OPERATOR_STATE, OPERATOR_ORDER, ORDERED_MISSION, TUNING, SHADOW, SIM_TIME, GPS,
-    IMU, THRUST_APPLIED, THRUSTERS_STATE, TRUE_POSE, BRIDGE_STATE, SENSORS_STATE, RECORDER_STATE,
+    IMU, AIS, THRUST_APPLIED, THRUSTERS_STATE, TRUE_POSE, BRIDGE_STATE, SENSORS_STATE, RECORDER_STATE,
     *ASKED, *STEPS.values(),
 )
 # fmt: on
@@ -263,6 +267,7 @@ PRODUCERS: Mapping[Graph, Mapping[str, str]] = {
         THRUST_APPLIED.name: "thrusters",
         GPS.name: "sensors",
         IMU.name: "sensors",
+        AIS.name: "sensors",
         RENDERED.name: NOBODY,
         TRUE_POSE.name: NOBODY,
     },

@@ -9,9 +9,11 @@ import os
 import random
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import pytest
+from pyais import encode_dict
 
 from paani import keys
 from paani import messages as m
@@ -314,3 +316,26 @@ async def test_paani_sensors_says_when_nothing_runs(
     code, _, errors = await paani((*private_sets, "bus.router=tcp/127.0.0.1:1"), "sensors")
     assert code == 2
     assert "nothing listens there" in errors
+
+
+async def test_vessels_that_speak_on_a_serial_line_reach_the_bus(spawn: Spawn, open_as: OpenAs, tmp_path: Path) -> None:
+    """An empty river says nothing, and that is in order; a receiver that is pulled out says nobody."""
+    bus, receiver = await open_as("observer"), Terminal(tmp_path / "ais")
+    receiver.plug()
+    ais = bus.latest(keys.AIS)
+    async with spawn("sensors", f'sensors.ais.line="{receiver.address}"'):
+        await device(bus, SensorRole.AIS, has(SensorStatus.OK), 12.0)
+        assert (await ais.next()).vessels == ()
+        report: dict[str, Any] = {"type": 1, "mmsi": 235000001, "lat": 51.4, "lon": -0.9, "speed": 4.0, "course": 90.0}
+        size: dict[str, Any] = {"type": 5, "mmsi": 235000001, "to_bow": 8, "to_stern": 6, "to_port": 1}
+        for line in (*encode_dict(size, sentence_type="VDM"), *encode_dict(report, sentence_type="VDM")):
+            receiver.write(f"{line}\r\n".encode())
+        async with asyncio.timeout(10.0):
+            while not (heard := (await ais.next()).vessels):
+                pass
+        assert (heard[0].mmsi, heard[0].to_bow_m, heard[0].cog_rad) == (235000001, 8.0, 0.0)
+        receiver.unplug()
+        await device(bus, SensorRole.AIS, has(SensorStatus.ABSENT), 12.0)
+        received = ais.received
+        await asyncio.sleep(2.5)
+        assert ais.received == received

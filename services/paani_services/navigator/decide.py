@@ -36,6 +36,7 @@ def decide(
         tracks=inputs[keys.TRACKS.name].message,
         order=ordered.message,
         order_us=ordered.received_us,
+        ais=inputs[keys.AIS.name].message,
     )
     camera = Camera(config.calibration, config.perception.ego_polygon)
     state, command = follow_order(
@@ -62,7 +63,16 @@ def _with_planner(planner: MotionPlanner) -> Decider[NavigatorState]:
 DECIDER = Decider(
     service="navigator",
     state=NavigatorState,
-    inputs=(keys.ADVISORY, keys.TRACKS, keys.EVIDENCE, keys.ODOMETRY, keys.SIM_TIME, keys.ARMING, keys.OPERATOR_ORDER),
+    inputs=(
+        keys.ADVISORY,
+        keys.TRACKS,
+        keys.EVIDENCE,
+        keys.ODOMETRY,
+        keys.SIM_TIME,
+        keys.ARMING,
+        keys.OPERATOR_ORDER,
+        keys.AIS,
+    ),
     own=(keys.ROUTE, keys.MISSION),
     outputs=(keys.COMMAND,),
     decide=decide,

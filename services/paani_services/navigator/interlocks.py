@@ -7,6 +7,7 @@ import msgspec
 from paani.config import NavigatorConfig
 from paani.messages import (
     Advisory,
+    AisVessels,
     Arming,
     Direction,
     Evidence,
@@ -33,6 +34,7 @@ class NavigatorInputs(msgspec.Struct, frozen=True):
     tracks: Tracks | None = None
     order: OperatorOrder | None = None
     order_us: int = 0
+    ais: AisVessels | None = None
 
 
 def is_out_of_date(stamp_us: int, limit_s: float, now_us: int, config: NavigatorConfig) -> bool:

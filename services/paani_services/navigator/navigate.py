@@ -14,6 +14,7 @@ from paani.fence_geometry import Fence, is_allowed
 from paani.geometry import wrap_rad
 from paani.messages import (
     Advisory,
+    AisVessels,
     Direction,
     Inhibit,
     Mission,
@@ -158,7 +159,7 @@ def navigate(
             heading_rad, speed_mps, TURN_SIDE.get(direction, 0.0), looks, 0.0 if looks else escape_mps
         )
         state, heading_rad, speed_mps, is_path_free = _steer_planned(
-            state, odometry, planner_setpoint, now_us, camera, config, mission.bounds, planner
+            state, odometry, planner_setpoint, now_us, camera, config, mission.bounds, planner, inputs.ais
         )
         if not is_path_free:
             inhibits.append(Inhibit.NO_FREE_PATH)
@@ -262,10 +263,11 @@ def _steer_planned(
     config: NavigatorConfig,
     fence: Fence,
     planner: MotionPlanner | None,
+    ais: AisVessels | None,
 ) -> tuple[NavigatorState, float, float, bool]:
     """The state, the planner's heading and speed, and whether it has a path or is still braking for want of one."""
     planner_state, plan = replan(
-        state.planner_state, odometry, setpoint, now_us, camera, config.planner, fence, planner
+        state.planner_state, odometry, setpoint, now_us, camera, config.planner, fence, planner, ais
     )
     state = msgspec.structs.replace(state, planner_state=planner_state)
     is_path_free = plan.speed_mps > 0.0 or is_braking(planner_state, odometry, now_us, config.planner)

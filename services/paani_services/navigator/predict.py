@@ -21,7 +21,8 @@ from paani.messages import (
 from paani_services.navigator.avoidance.courtesy import Encounter, assess_encounter, describe_encounter
 from paani_services.navigator.avoidance.replanning import PlannerState, explain_plan
 from paani_services.navigator.avoidance.rollout import BoatState, roll_out
-from paani_services.navigator.mapping.dynamic_obstacles import find_dynamic_obstacles
+from paani_services.navigator.mapping.ais_targets import predict_unseen_targets
+from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle, find_dynamic_obstacles
 from paani_services.navigator.mapping.observed_cells import Camera
 from paani_services.navigator.navigate import NavigatorState
 
@@ -109,13 +110,18 @@ def _encounters(
     before: Prediction | None,
 ) -> list[Encounter]:
     """Those with the obstacles that the plan was made for."""
-    if not planner.obstacle_track_ids:
+    has_targets = planner.basis is not None and bool(planner.basis.targets)
+    if not planner.obstacle_track_ids and not has_targets:
         return []
-    classes = {each.track_id: each.encounter for each in before.obstacles} if before is not None else {}
+    classes = {(each.track_id, each.mmsi): each.encounter for each in before.obstacles} if before is not None else {}
+    seen = find_dynamic_obstacles(planner.memory.observations, now_us, camera, config.planner)
+    unseen: list[DynamicObstacle] = []
+    if planner.basis is not None and not has_passed(planner.planned_us, PLAN_MAX_AGE_US, now_us):
+        unseen = predict_unseen_targets(planner.basis.targets, seen, boat[:3], camera.calibration)
     return [
-        assess_encounter(each, boat, classes.get(each.track_id, EncounterClass.NONE))
-        for each in find_dynamic_obstacles(planner.memory.observations, now_us, camera, config.planner)
-        if each.track_id in planner.obstacle_track_ids
+        assess_encounter(each, boat, classes.get((each.track_id, each.mmsi), EncounterClass.NONE))
+        for each in (*seen, *unseen)
+        if each.mmsi or each.track_id in planner.obstacle_track_ids
     ]
 
 
@@ -136,4 +142,5 @@ def _on_map(encounter: Encounter, boat: BoatState, odometry: Odometry) -> Moving
         cpa_std_m=max(0.0, encounter.cpa_std_m),
         tcpa_s=encounter.approach.tcpa_s,
         encounter=encounter.kind,
+        mmsi=obstacle.mmsi,
     )

@@ -1,21 +1,24 @@
 """What is known of one device: its bytes, frames, rate and age, and the status that follows. Pure."""
 
+import math
 from collections import Counter, deque
 
 from paani.messages import SensorDevice, SensorRole, SensorStatus
 
 RATE_WINDOW_S = 5.0  # over which the rate of data is counted
 SHORTEST_SPAN_S = 0.5  # data that come in one piece show no rate
-SILENT_S = 2.0  # without a byte: every device of these kinds speaks once a second at least
+# Without a byte: every device speaks once a second at least, but a receiver that no vessel is near.
+SILENT_S = {SensorRole.GPS: 2.0, SensorRole.IMU: 2.0, SensorRole.HEADING: 2.0, SensorRole.AIS: math.inf}
 UNREADABLE_S = 2.0  # with bytes, and without an intact frame
 # Without usable data; the estimate gives up no later (`LocalizationConfig.max_gps_age_s` and its kind).
-LATE_S = {SensorRole.GPS: 3.0, SensorRole.IMU: 0.5, SensorRole.HEADING: 3.0}
+LATE_S = {SensorRole.GPS: 3.0, SensorRole.IMU: 0.5, SensorRole.HEADING: 3.0, SensorRole.AIS: math.inf}
 NEVER_AGE_S = 1e6  # of data that never came, as in the health reports
 KINDS_SHOWN = 12
 NEEDED = {
     SensorRole.GPS: "no position (RMC, or GLL with VTG, or UBX NAV-PVT)",
     SensorRole.IMU: "no sample (PQTMIMU or VNYMR)",
     SensorRole.HEADING: "no heading (HDT, THS, HDG or HDM)",
+    SensorRole.AIS: "no position report (VDM)",
 }
 
 
@@ -90,10 +93,10 @@ class Device:
         )
 
     def _status(self, line: Line, now_us: int) -> tuple[SensorStatus, str]:
-        silent_s, unread_s = (now_us - line.last_byte_us) * 1e-6, (now_us - line.last_frame_us) * 1e-6
+        silent_s, unread_s = (now_us - line.last_byte_us) * 1e-6, (line.last_byte_us - line.last_frame_us) * 1e-6
         if line.problem:
             return SensorStatus.ABSENT, line.problem
-        if silent_s > SILENT_S:
+        if silent_s > SILENT_S[self.role]:
             return SensorStatus.SILENT, f"open, but no byte for {silent_s:.0f} s: check power and wiring"
         if unread_s > UNREADABLE_S:
             if line.foreign:

@@ -85,12 +85,12 @@ _SIDES = {"NS": ("N", "S"), "EW": ("E", "W")}
 
 
 def read_sentence(data: bytes) -> tuple[str, Sentence | None]:
-    """Its kind, and the sentence if it is one of `READ_SENTENCES`.
+    """Its kind, and the sentence if it is one of `READ_SENTENCES`. Those of AIS begin with `!`.
 
     Raises ChecksumError, and ValueError for one that is damaged in another way.
     """
     try:
-        content, talker, formatter, _, checksum = get_parts(data.strip())
+        content, talker, formatter, _, checksum = get_parts(data.strip().lstrip(b"!"))
     except _LIBRARY_ERRORS as error:
         raise ChecksumError("no checksum") from error
     if checksum.upper() != calc_checksum(content):

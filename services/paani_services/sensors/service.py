@@ -1,4 +1,4 @@
-"""Sensor process: GPS, IMU and heading devices of a real hull in, fixes and samples out."""
+"""Sensor process: GPS, IMU, heading and AIS devices of a real hull in, fixes, samples and vessels out."""
 
 import asyncio
 from collections import Counter
@@ -25,6 +25,7 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     suite = SensorSuite(config.sensors)
     step = ClockStep(clock, MonotonicClock())
     gps, imu, state = bus.publisher(keys.GPS), bus.publisher(keys.IMU), bus.publisher(keys.SENSORS_STATE)
+    ais = bus.publisher(keys.AIS)
 
     def publish(reading: Reading) -> None:
         for fix in reading.fixes:
@@ -41,6 +42,9 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
                 now_us = clock.now_us()
                 devices = suite.report(now_us)
                 state.put(m.SensorsState(source_us=now_us, devices=devices))
+                vessels = suite.vessels(now_us)
+                if vessels is not None:
+                    ais.put(m.AisVessels(source_us=now_us, vessels=vessels))
                 bus.note(_summary(devices))
                 for cause, n in (suite.drops - counted).items():
                     bus.count_drop(cause, n)

@@ -10,7 +10,8 @@ from typing import NamedTuple
 import msgspec
 
 from paani.config import SensorDevicesConfig
-from paani.messages import GpsFix, ImuSample, SensorDevice, SensorRole
+from paani.messages import AisVessel, GpsFix, ImuSample, SensorDevice, SensorRole
+from paani_services.sensors.ais_reports import SENTENCE, AisReports
 from paani_services.sensors.device import Device, Line
 from paani_services.sensors.fixes import FixDecoder
 from paani_services.sensors.framing import Frame, Framer, Protocol
@@ -45,6 +46,7 @@ class SensorSuite:
         """What was refused since the process began, by cause."""
         named = {
             SensorRole.GPS: config.gps.line, SensorRole.IMU: config.imu.line, SensorRole.HEADING: config.heading.line,
+            SensorRole.AIS: config.ais.line,
         }  # fmt: skip
         self._lines = {address: Line(address) for address in named.values() if address}
         self._framers = {address: Framer() for address in self._lines}
@@ -56,6 +58,7 @@ class SensorSuite:
         self._sample_watch, self._gravity_watch, self._sample_us = SampleWatch(), GravityWatch(), 0
         self._sample_clock, self._device_ms = ReceiptClock(), 0
         self._heading_watch, self._yaw = HeadingWatch(), YawKeeper(config.heading.max_age_s)
+        self._ais = AisReports(self.drops, config.ais.own_mmsi)
 
     @property
     def lines(self) -> Mapping[str, Line]:
@@ -86,6 +89,7 @@ class SensorSuite:
         """The clock that `now_us` comes from was set, ahead if positive."""
         self._fix_clock.shift(step_us)
         self._sample_clock.shift(step_us)
+        self._ais.shift_clock(step_us)
         self._fix_us, self._sample_us = max(self._fix_us + step_us, 0), max(self._sample_us + step_us, 0)
 
     def take(self, address: str, data: bytes, now_us: int) -> Reading:
@@ -109,6 +113,11 @@ class SensorSuite:
         self.drops += Counter(nmea_damaged=cut, ubx_checksum=failed)
         return Reading(tuple(fixes), self._stamped(samples, now_us))
 
+    def vessels(self, now_us: int) -> tuple[AisVessel, ...] | None:
+        """Those that the AIS receiver has heard; None while there is no receiver."""
+        line = self._devices[SensorRole.AIS].line
+        return None if line is None or line.problem else self._ais.vessels(now_us)
+
     def report(self, now_us: int) -> tuple[SensorDevice, ...]:
         """Every device, whether it is set or not."""
         return tuple(device.report(now_us) for device in self._devices.values())
@@ -119,7 +128,7 @@ class SensorSuite:
     def _take_frame(
         self, line: Line, frame: Frame, now_us: int, fixes: list[GpsFix], samples: list[InertialSample]
     ) -> None:
-        gps, imu, heading = (self._devices[role] for role in SensorRole)
+        gps, imu, heading, ais = (self._devices[role] for role in SensorRole)
         is_gps = gps.line is line
         protocol = self._config.gps.protocol if is_gps else "auto"
         if protocol not in {"auto", frame.protocol.lower()}:
@@ -132,6 +141,8 @@ class SensorSuite:
             return
         kind, sentence = read_sentence(frame.data)
         _count_frame(line, kind, now_us)
+        if ais.line is line and kind == SENTENCE and self._ais.take_sentence(frame.data, now_us):
+            ais.count_data(now_us)
         if sentence is None:
             return
         if is_gps and kind in FIX_SENTENCES:

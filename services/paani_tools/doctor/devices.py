@@ -60,6 +60,7 @@ def check_serial(config: Config) -> Iterator[Verdict]:
         "sensors.gps.line": sensors.gps.line,
         "sensors.imu.line": sensors.imu.line,
         "sensors.heading.line": sensors.heading.line,
+        "sensors.ais.line": sensors.ais.line,
     }
     if not any(lines.values()):
         yield passed("no line is set")

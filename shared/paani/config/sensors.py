@@ -1,4 +1,4 @@
-"""Devices of a real hull: GPS, IMU and heading, each on a line of its own or several on one."""
+"""Devices of a real hull: GPS, IMU, heading and AIS, each on a line of its own or several on one."""
 
 from __future__ import annotations
 
@@ -45,19 +45,28 @@ class HeadingConfig(Section, frozen=True):
     max_age_s: Positive = 1.5  # of a heading that the gyro carries on: the slowest compasses speak once a second
 
 
+class AisConfig(Section, frozen=True):
+    """A receiver of what vessels tell of themselves. It adds caution where the camera does not look."""
+
+    line: str = ""  # none unless one is named; many receivers speak 38400 baud
+    own_mmsi: Annotated[int, msgspec.Meta(ge=0, le=999_999_999)] = 0  # of a transponder on the boat itself; 0: none
+
+
 class SensorDevicesConfig(Section, frozen=True):
     """What is on the boat's lines. Nothing is published for a device that is not set."""
 
     gps: GpsConfig = GpsConfig()
     imu: ImuConfig = ImuConfig()
     heading: HeadingConfig = HeadingConfig()
+    ais: AisConfig = AisConfig()
     # East positive; makes magnetic headings true. Unset: only headings that bring their own variation are used,
     # because a wrong one turns the boat.
     variation_deg: Degrees | None = None
 
     def __post_init__(self) -> None:
         """Every line is one that can be opened."""
-        for name, line in (("gps", self.gps.line), ("imu", self.imu.line), ("heading", self.heading.line)):
+        for name in ("gps", "imu", "heading", "ais"):
+            line = getattr(self, name).line
             try:
                 require_line(line)
             except ValueError as error:

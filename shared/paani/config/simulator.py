@@ -36,6 +36,7 @@ class SensorsConfig(Section, frozen=True):
     accel_noise_mps2: NonNegative = 0.03  # of one sample
     compass_noise_rad: NonNegative = 0.01  # of one sample
     compass_bias_std_rad: NonNegative = 0.02  # constant over a drive, drawn at its start
+    ais: bool = True  # whether the boat has a receiver
 
 
 class AdapterConfig(Section, frozen=True):

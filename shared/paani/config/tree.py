@@ -196,6 +196,7 @@ class Config(Section, frozen=True):
             "sensors.gps.line": sensors.gps.line,
             "sensors.imu.line": sensors.imu.line,
             "sensors.heading.line": sensors.heading.line,
+            "sensors.ais.line": sensors.ais.line,
         }
         for name, line in devices.items():
             for other, taken in (

@@ -25,6 +25,7 @@ from paani.messages.advisor import (
     Track,
     Tracks,
 )
+from paani.messages.ais import AisVessel, AisVessels
 from paani.messages.camera import PictureHeader, TimeBase
 from paani.messages.decision import InputMessage, OutputMessage, Step
 from paani.messages.guidance import STATION_ASTERN_MPS, Arming, Inhibit, NavCommand, Odometry, Route, Thrust, Waypoint
@@ -74,6 +75,8 @@ __all__ = [
     "SIDE_OF",
     "STATION_ASTERN_MPS",
     "Advisory",
+    "AisVessel",
+    "AisVessels",
     "ArmRefusal",
     "Arming",
     "BarredMode",

@@ -6,6 +6,7 @@ from enum import StrEnum
 
 import msgspec
 
+from paani.messages.ais import Mmsi
 from paani.messages.guidance import Waypoint
 from paani.messages.header import Count, Finite, Message, NonNegative, Text
 
@@ -27,7 +28,8 @@ class EncounterClass(StrEnum):
 class MovingObstacle(msgspec.Struct, frozen=True, kw_only=True):
     """A dynamic obstacle that the plan in force was made for: its middle now, its half width, and its velocity.
 
-    track_id: the advisor's track. velocity_std_mps: standard deviation, of a person who may swim alone. age_s: since it
+    track_id: the advisor's track, 0 without one. mmsi: of a vessel that told of itself by AIS, where the camera does
+    not look; 0 of what was seen. velocity_std_mps: standard deviation, of a person who may swim alone. age_s: since it
     was last seen; within that time its place is predicted.
     tcpa_s, cpa_m: when, by the present velocities of both, its outline will be nearest to the boat's middle, and how
     near; cpa_std_m: standard deviation of that. Unset where they were not computed.
@@ -46,6 +48,7 @@ class MovingObstacle(msgspec.Struct, frozen=True, kw_only=True):
     cpa_std_m: NonNegative | msgspec.UnsetType = msgspec.UNSET
     tcpa_s: NonNegative | msgspec.UnsetType = msgspec.UNSET
     encounter: EncounterClass = EncounterClass.NONE
+    mmsi: Mmsi = 0
 
 
 class Constraint(StrEnum):

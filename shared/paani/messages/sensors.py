@@ -15,6 +15,7 @@ class SensorRole(StrEnum):
     GPS = "gps"
     IMU = "imu"
     HEADING = "heading"
+    AIS = "ais"
 
 
 class SensorStatus(StrEnum):

@@ -9,8 +9,10 @@ import mujoco
 import numpy as np
 
 from paani.config import PlantConfig
+from paani.messages import AisVessel
 from paani_sim.plant import passive
 from paani_sim.plant.actors import Actors
+from paani_sim.plant.ais import AisReceiver
 from paani_sim.plant.dynamics import Attitude, Fans, HullState, apply_fan_lag, attitude, body_velocity, compute_wrench
 from paani_sim.plant.instrument_faults import apply_gps_jump, apply_gps_outage, apply_imu_bias, apply_thruster_loss
 from paani_sim.plant.sensors import (
@@ -86,10 +88,12 @@ class Plant:
         self._mocap = [self._model.body(actor.id).mocapid[0] for actor in world.actors]
         self._vessels = [index for index, actor in enumerate(world.actors) if makes_waves(actor)]
 
-        biases, gps, imu, water = np.random.SeedSequence(seed).spawn(4)
+        biases, gps, imu, water, ais = np.random.SeedSequence(seed).spawn(5)
         self._gps_rng, self._imu_rng = np.random.default_rng(gps), np.random.default_rng(imu)
         self._errors = initial_errors(config.sensors, np.random.default_rng(biases))
         self._water = Water(world, self._vessel, len(self._vessels), water)
+        origin_deg = (world.origin_lat_deg, world.origin_lon_deg)
+        self._ais = AisReceiver(world.actors, origin_deg, np.random.default_rng(ais))
         self._last_fix = GpsReading(world.origin_lat_deg, world.origin_lon_deg, 0.0, 0.0, 0.0, fix=False)
 
         self.steps = 0
@@ -190,6 +194,10 @@ class Plant:
         """One IMU sample."""
         reading = measure_imu(self._errors, self._truth(), self._config.sensors, self._imu_rng)
         return apply_imu_bias(reading, self._faults, self.sim_us * 1e-6) if self._faults else reading
+
+    def read_ais(self, now_us: int) -> tuple[AisVessel, ...]:
+        """The vessels that an AIS receiver has heard, dated by `now_us`; to be read once a second."""
+        return self._ais.hear(self._actors.poses, self._actors.speeds_mps, self.sim_us * 1e-6, now_us)
 
     def state_hash(self) -> str:
         """SHA-256 of position and velocity, to compare runs bit by bit."""

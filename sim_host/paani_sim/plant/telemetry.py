@@ -4,6 +4,7 @@ from paani import keys
 from paani import messages as m
 from paani.bus import Bus
 from paani.config import PlantConfig
+from paani.messages.ais import MAX_VESSELS
 from paani_sim.plant.plant import Plant
 
 
@@ -29,6 +30,11 @@ def imu_message(plant: Plant, source_us: int) -> m.ImuSample:
         pitch_rad=reading.pitch_rad,
         yaw_rad=reading.yaw_rad,
     )
+
+
+def ais_message(plant: Plant, source_us: int) -> m.AisVessels:
+    """Read the AIS receiver."""
+    return m.AisVessels(source_us=source_us, vessels=plant.read_ais(source_us)[:MAX_VESSELS])
 
 
 def pose_message(plant: Plant, source_us: int) -> m.TruePose:
@@ -63,10 +69,11 @@ class Measurements:
 
     def __init__(self, bus: Bus, config: PlantConfig) -> None:
         self._gps, self._imu = bus.publisher(keys.GPS), bus.publisher(keys.IMU)
-        self._pose = bus.publisher(keys.TRUE_POSE)
+        self._ais, self._pose = bus.publisher(keys.AIS), bus.publisher(keys.TRUE_POSE)
         rate_hz = 1.0 / config.step_s
         self._gps_every = max(1, round(rate_hz / config.sensors.gps_rate_hz))
         self._imu_every = max(1, round(rate_hz / config.sensors.imu_rate_hz))
+        self._ais_every = max(1, round(rate_hz / keys.AIS.rate_hz)) if config.sensors.ais else 0
         self._pose_every = report_every(config)
 
     def publish(self, plant: Plant, source_us: int) -> None:
@@ -75,5 +82,7 @@ class Measurements:
             self._imu.put(imu_message(plant, source_us))
         if plant.steps % self._gps_every == 0:
             self._gps.put(gps_message(plant, source_us))
+        if self._ais_every and plant.steps % self._ais_every == 0:
+            self._ais.put(ais_message(plant, source_us))
         if plant.steps % self._pose_every == 0:
             self._pose.put(pose_message(plant, source_us))

@@ -16,7 +16,7 @@ from paani.cores import load_estimator
 from paani.motion_planning import MotionPlanner
 from paani.thrust_adapter import AppliedThrust, InForce, ThrustAdapter, applied_message
 from paani_sim.plant.plant import Plant, PlantDiverged
-from paani_sim.plant.telemetry import gps_message, imu_message, pose_message
+from paani_sim.plant.telemetry import ais_message, gps_message, imu_message, pose_message
 from paani_sim.trials.autonomy_stack import AutonomyStack
 from paani_sim.trials.drive_history import DriveHistory
 from paani_sim.trials.drive_states import DriveOutcome, DrivePhase
@@ -94,6 +94,7 @@ class Drive:
             for what, hz in {
                 "imu": sensors.imu_rate_hz,
                 "gps": sensors.gps_rate_hz,
+                "ais": keys.AIS.rate_hz,
                 "estimate": config.localization.rate_hz,
                 "report": config.plant.publish_rate_hz,
                 "look": processed_frame_rate_hz(config),
@@ -136,7 +137,7 @@ class Drive:
             return
         now_us = self.now_us
         linked = is_linked(self.scenario.faults, self.plant.sim_us * 1e-6)
-        self._publish_measurements(now_us)
+        self._publish_measurements(now_us, linked=linked)
         self._update_estimate(now_us, linked=linked)
         self._update_evidence(now_us, linked=linked)
         self._publish_arming_and_pulses(now_us, linked=linked)
@@ -164,11 +165,15 @@ class Drive:
     def _is_due(self, what: str) -> bool:
         return self.plant.steps % self._steps_between[what] == 0
 
-    def _publish_measurements(self, now_us: int) -> None:
+    def _publish_measurements(self, now_us: int, *, linked: bool) -> None:
         if self._is_due("imu"):
             self._imu_samples.append(self._bus.put(keys.IMU, imu_message(self.plant, now_us)))
         if self._is_due("gps"):
             self._gps_fix = self._bus.put(keys.GPS, gps_message(self.plant, now_us))
+        if self.config.plant.sensors.ais and self._is_due("ais"):
+            heard = self._bus.put(keys.AIS, ais_message(self.plant, now_us))
+            if linked:
+                self.autonomy.deliver(keys.AIS, heard)
 
     def _update_estimate(self, now_us: int, *, linked: bool) -> None:
         if not self._is_due("estimate"):

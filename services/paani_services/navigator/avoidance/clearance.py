@@ -118,7 +118,8 @@ def is_within_horizon(time_s: F64, config: PlannerConfig) -> Bools:
 
 def position_deviation_m(obstacle: DynamicObstacle, time_s: F64 | float) -> F64 | float:
     """Standard deviation of the obstacle's predicted position at these times from now."""
-    return obstacle.velocity.deviation_mps * (time_s + obstacle.age_s) + UNSEEN_GROWTH_MPS * obstacle.age_s
+    grown_m = obstacle.velocity.deviation_mps * (time_s + obstacle.age_s) + UNSEEN_GROWTH_MPS * obstacle.age_s
+    return grown_m + obstacle.position_std_m
 
 
 def required_clearance_m(time_s: F64, resting_m: float | F64, config: PlannerConfig) -> F64:

@@ -65,7 +65,7 @@ def describe_encounter(encounter: Encounter, boat: BoatState, order: NavCommand)
     if encounter.kind is EncounterClass.NONE:
         return ""
     obstacle = encounter.obstacle
-    number = f" #{obstacle.track_id}" if obstacle.track_id else ""
+    number = f" #{obstacle.track_id}" if obstacle.track_id else f" {obstacle.mmsi} (AIS)" if obstacle.mmsi else ""
     action = _describe_action(encounter, boat, order)
     return f"Give way: {obstacle.label.value}{number} {MEETINGS[encounter.kind]}, {action}"
 

@@ -110,7 +110,7 @@ def evaluate_candidates(request: PlanRequest) -> CandidateEvaluation:
     last = int(is_in_horizon.sum()) - 1
     at_rest = BoatState(float(paths.x_m[last, -2]), float(paths.y_m[last, -2]), start.yaw_rad)
     comes = np.array([is_coming_near(each, at_rest, tight_m) for each in obstacles], dtype=np.bool_)
-    is_faster = np.array([_is_faster(each, float(speeds_mps[0])) for each in obstacles], dtype=np.bool_)
+    is_faster = np.array([is_faster_than(each, float(speeds_mps[0])) for each in obstacles], dtype=np.bool_)
     predicted, runs_down = predict_clearances(obstacles, paths, config), comes & is_faster
     dynamic = predicted.of(~runs_down)
     dynamic_m = least_of_obstacles_m(dynamic.candidates_m)
@@ -146,7 +146,7 @@ def evaluate_candidates(request: PlanRequest) -> CandidateEvaluation:
     )
 
 
-def _is_faster(obstacle: DynamicObstacle, limit_mps: float) -> bool:
+def is_faster_than(obstacle: DynamicObstacle, limit_mps: float) -> bool:
     """Whether it is under way for certain and goes faster than the boat may; nobody who swims counts.
 
     A person who is faster for certain than anybody swims is aboard of what goes there.

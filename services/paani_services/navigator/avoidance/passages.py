@@ -20,8 +20,9 @@ from paani_services.navigator.avoidance.clearance import (
     UNSEEN_GROWTH_MPS,
     WANTED_CPA_M,
     position_deviation_m,
+    predicted_clearance_m,
 )
-from paani_services.navigator.avoidance.evaluation import CandidateEvaluation
+from paani_services.navigator.avoidance.evaluation import CandidateEvaluation, is_faster_than
 from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle
 
 LEAST_CLOSING_MPS = 1e-6  # keeps directions finite
@@ -67,13 +68,18 @@ class Passages(NamedTuple):
 
 
 def find_passages(evaluation: CandidateEvaluation) -> Passages:
-    """The passages of the candidates by the vessels that the plan keeps off."""
+    """The passages of the candidates by the vessels that the plan keeps off, and by those known by AIS."""
     paths, request = evaluation.trajectories, evaluation.request
     known = zip(request.predicted_obstacles, evaluation.predicted.candidates_m, evaluation.is_faster, strict=True)
     vessels = [
         (obstacle, clearance_m, is_faster)
         for obstacle, clearance_m, is_faster in known
         if (obstacle.label is not Label.PERSON or is_faster) and obstacle.velocity.speed_mps > UNDER_WAY_MPS[0]
+    ]
+    time_s, fastest_mps = paths.time_s[:, None], float(evaluation.speeds_mps[0])
+    vessels += [
+        (each, predicted_clearance_m(each, paths.x_m, paths.y_m, time_s), is_faster_than(each, fastest_mps))
+        for each in request.ais_vessels
     ]
     last = int(evaluation.is_in_horizon.sum()) - 1
     then_s = float(paths.time_s[last])
@@ -114,7 +120,7 @@ def _pass(
     # Without motion between the two there is no direction across it: that of the same heading, faster, stands for it.
     across_variance = np.where(closing_mps > LEAST_CLOSING_MPS, across_variance, across_variance[fastest])
     unknown_s = vessel.age_s + np.minimum(np.maximum(time_s, 0.0), APPROACH_S)
-    deviation_m = np.sqrt(across_variance) * unknown_s + UNSEEN_GROWTH_MPS * vessel.age_s
+    deviation_m = np.sqrt(across_variance) * unknown_s + UNSEEN_GROWTH_MPS * vessel.age_s + vessel.position_std_m
     speed_mps = velocity.speed_mps
     speed_variance = float(velocity.variance_along(velocity.east_mps / speed_mps, velocity.north_mps / speed_mps))
     adrift_mps, sure_mps = UNDER_WAY_MPS

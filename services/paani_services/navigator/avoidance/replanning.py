@@ -8,14 +8,15 @@ from paani.clock import has_passed
 from paani.config import PlannerConfig
 from paani.fence_geometry import Fence
 from paani.geometry import wrap_rad
-from paani.messages import Evidence, HeadingVerdict, Odometry, Tracks
+from paani.messages import AisVessels, Evidence, HeadingVerdict, Odometry, Tracks
 from paani.motion_planning import MotionPlanner, MovingObstacle, PlanningInputs
 from paani_services.navigator.avoidance.fence_cells import apply_fence
 from paani_services.navigator.avoidance.planner import judge_candidates, plan_motion
 from paani_services.navigator.avoidance.request import PlanRequest
 from paani_services.navigator.avoidance.rollout import RESIDUAL_DRIFT_MPS, BoatState, GuidanceSetpoint, Plan
 from paani_services.navigator.avoidance.verdicts import tell_headings
-from paani_services.navigator.mapping.dynamic_obstacles import map_water
+from paani_services.navigator.mapping.ais_targets import AisTarget, locate_targets, predict_unseen_targets
+from paani_services.navigator.mapping.dynamic_obstacles import is_refuted, map_water
 from paani_services.navigator.mapping.observation import ObservationMemory, add_track_ids, update_memory
 from paani_services.navigator.mapping.observed_cells import CELL_M, Camera
 
@@ -26,7 +27,7 @@ PERSON_NEAR_M = 1.5  # `advisor.people.stop_m`: nobody is so near to fans that t
 class PlanBasis(msgspec.Struct, frozen=True, kw_only=True):
     """What a plan was requested with beside the course and the water, so that the request can be made again.
 
-    map_offset_m: east and north of the boat in the map, less those by dead reckoning.
+    map_offset_m: east and north of the boat in the map, less those by dead reckoning. targets: vessels told by AIS.
     """
 
     start: BoatState
@@ -36,6 +37,7 @@ class PlanBasis(msgspec.Struct, frozen=True, kw_only=True):
     may_wait: bool
     map_offset_m: tuple[float, float]
     escape_mps: float = 0.0
+    targets: tuple[AisTarget, ...] = ()
 
 
 class PlannerState(
@@ -85,6 +87,7 @@ def replan(
     config: PlannerConfig,
     fence: Fence = (),
     planner: MotionPlanner | None = None,
+    ais: AisVessels | None = None,
 ) -> tuple[PlannerState, Plan]:
     """The plan for this setpoint, within the fence and no faster than the setpoint allows; by `planner` where given.
 
@@ -108,6 +111,7 @@ def replan(
             may_wait=(now_us - since_us) * 1e-6 < config.patience_s,
             map_offset_m=(odometry.x_m - here.x_m, odometry.y_m - here.y_m),
             escape_mps=setpoint.escape_mps,
+            targets=locate_targets(ais, odometry, here, now_us, config),
         )
         request = _request_plan(state.memory, basis, setpoint, now_us, camera, config, fence)
         plan = plan_motion(request) if planner is None else Plan(*planner(_planning_inputs(request)))
@@ -155,13 +159,16 @@ def _request_plan(
     fence: Fence,
 ) -> PlanRequest:
     """The request on the water as it is remembered: the grid ends at the fence."""
-    grid, obstacles = map_water(memory.observations, basis.start[:2], now_us, camera, config)
+    start = basis.start
+    grid, seen = map_water(memory.observations, start[:2], now_us, camera, config)
+    unseen = predict_unseen_targets(basis.targets, seen, start[:3], camera.calibration)
     return PlanRequest(
         grid=apply_fence(grid, fence, basis.map_offset_m),
-        start=basis.start,
+        start=start,
         setpoint=setpoint,
         config=config,
-        obstacles=obstacles,
+        obstacles=seen,
+        ais_vessels=tuple(each for each in unseen if not is_refuted(each, grid)),
         previous=basis.previous,
         may_wait=basis.may_wait,
     )

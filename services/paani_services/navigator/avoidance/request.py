@@ -19,6 +19,7 @@ class PlanRequest(msgspec.Struct, frozen=True, kw_only=True):
     """All that a plan depends on: equal requests get equal plans.
 
     grid, obstacles: the water around the boat, and what moves on it, which is not on the grid; all in one frame.
+    ais_vessels: what is known by AIS alone: it has costs, and refuses nothing.
     start: the boat in that frame. previous: the plan in force until now, None without one.
     may_wait: whether the boat may wait for obstacles to pass. Once it may no longer, people who may swim but were not
     seen to are static obstacles.
@@ -29,6 +30,7 @@ class PlanRequest(msgspec.Struct, frozen=True, kw_only=True):
     setpoint: GuidanceSetpoint
     config: PlannerConfig
     obstacles: Sequence[DynamicObstacle] = ()
+    ais_vessels: Sequence[DynamicObstacle] = ()
     previous: Plan | None = None
     may_wait: bool = True
 

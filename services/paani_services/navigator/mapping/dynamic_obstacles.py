@@ -51,6 +51,7 @@ class DynamicObstacle(NamedTuple):
 
     vacated_boxes: boxes that show it where it is no more. Where it was within `free_s` of when it was last seen stays
     occupied. track_id: the advisor's track that it was last seen as; 0: unknown. label: what the detector takes it for.
+    mmsi: of a vessel that is known by AIS alone; 0: seen. position_std_m: of its outline when that was known.
     """
 
     east_m: F64
@@ -61,6 +62,8 @@ class DynamicObstacle(NamedTuple):
     vacated_boxes: BoxIds
     track_id: int = 0
     label: Label = Label.VESSEL
+    mmsi: int = 0
+    position_std_m: float = 0.0
 
     @property
     def is_moving(self) -> bool:
