@@ -289,19 +289,20 @@ async def test_paani_sensors_shows_what_each_says_and_what_is_missing(
         await device(bus, SensorRole.IMU, lambda each: each.rate_hz > 90.0, 10.0)
         code, out, errors = await paani(private_sets, "sensors", "--for", "2.5")
         assert (code, errors) == (1, "")
-        gps, imu, heading, lacks = out.split("\n\n")[1].splitlines()
+        gps, imu, heading, ais, lacks = out.split("\n\n")[1].splitlines()
         assert gps.startswith("gps     ok")
         assert "48.11" in gps
         assert "m/s^2" in imu
         assert heading.startswith("heading absent")
         assert "next try" in heading
+        assert ais.split()[:2] == ["ais", "off"], "a boat without one lacks nothing"
         assert lacks == "missing: a heading: the boat stays stopped without one"
         terminals["heading"].plug()
         await device(bus, SensorRole.HEADING, has(SensorStatus.OK), 10.0)
         code, out, errors = await paani(private_sets, "sensors", "--for", "2.5", "--json")
         assert (code, errors) == (0, "")
         row = msgspec.json.decode(out.splitlines()[-1])
-        assert [each["status"] for each in row["devices"]] == ["ok", "ok", "ok"]
+        assert [each["status"] for each in row["devices"]] == ["ok", "ok", "ok", "off"]
         assert row["missing"] == ""
         assert row["imu"]["orientation_available"]
 
