@@ -22,7 +22,7 @@ from paani_services.navigator.avoidance.courtesy import Encounter, assess_encoun
 from paani_services.navigator.avoidance.replanning import PlannerState, explain_plan
 from paani_services.navigator.avoidance.rollout import BoatState, roll_out
 from paani_services.navigator.mapping.ais_targets import predict_unseen_targets
-from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle, find_dynamic_obstacles
+from paani_services.navigator.mapping.dynamic_obstacles import find_dynamic_obstacles
 from paani_services.navigator.mapping.observed_cells import Camera
 from paani_services.navigator.navigate import NavigatorState
 
@@ -110,14 +110,13 @@ def _encounters(
     before: Prediction | None,
 ) -> list[Encounter]:
     """Those with the obstacles that the plan was made for."""
-    has_targets = planner.basis is not None and bool(planner.basis.targets)
-    if not planner.obstacle_track_ids and not has_targets:
+    is_old = has_passed(planner.planned_us, PLAN_MAX_AGE_US, now_us)
+    targets = planner.basis.targets if planner.basis is not None and not is_old else ()
+    if not planner.obstacle_track_ids and not targets:
         return []
     classes = {(each.track_id, each.mmsi): each.encounter for each in before.obstacles} if before is not None else {}
     seen = find_dynamic_obstacles(planner.memory.observations, now_us, camera, config.planner)
-    unseen: list[DynamicObstacle] = []
-    if planner.basis is not None and not has_passed(planner.planned_us, PLAN_MAX_AGE_US, now_us):
-        unseen = predict_unseen_targets(planner.basis.targets, seen, boat[:3], camera.calibration)
+    unseen = predict_unseen_targets(targets, seen, boat[:3], camera.calibration)
     return [
         assess_encounter(each, boat, classes.get((each.track_id, each.mmsi), EncounterClass.NONE))
         for each in (*seen, *unseen)

@@ -15,11 +15,11 @@ from pyais.queue import NMEAQueue
 from paani.geometry import enu_from_geodetic
 from paani.messages import AisVessel
 from paani.messages.ais import MAX_VESSELS
+from paani_services.sensors.fixes import MPS_PER_KNOT
 from paani_services.sensors.sentences import course_rad
 
 SENTENCE = "VDM"  # of other vessels; VDO is of our own
 POSITION_TYPES, SIZE_TYPES = frozenset({1, 2, 3, 18, 19}), frozenset({5, 19, 24})
-KNOT_MPS = 1852.0 / 3600.0
 NO_SPEED_KNOTS, NO_COURSE_DEG = 102.3, 360.0  # a report that says so has none (ITU-R M.1371-5, table 48)
 MAX_SPEED_MPS = 30.0  # 58 knots: faster than what is licensed on inland waters, by far
 JUMP_M = 100.0  # by which two reports may disagree: receivers, and a turn between them
@@ -152,7 +152,7 @@ def _vessel(mmsi: int, report: Any, now_us: int) -> AisVessel | None:
         fixed_us=now_us,
         latitude_deg=latitude_deg,
         longitude_deg=longitude_deg,
-        sog_mps=knots * KNOT_MPS,
+        sog_mps=knots * MPS_PER_KNOT,
         cog_rad=course_rad(course_deg),
     )
 

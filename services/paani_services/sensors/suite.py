@@ -44,10 +44,7 @@ class SensorSuite:
         self._config = config
         self.drops = Counter[str]()
         """What was refused since the process began, by cause."""
-        named = {
-            SensorRole.GPS: config.gps.line, SensorRole.IMU: config.imu.line, SensorRole.HEADING: config.heading.line,
-            SensorRole.AIS: config.ais.line,
-        }  # fmt: skip
+        named = {SensorRole(role): line for role, line in config.lines.items()}
         self._lines = {address: Line(address) for address in named.values() if address}
         self._framers = {address: Framer() for address in self._lines}
         self._devices = {role: Device(role, self._lines.get(address)) for role, address in named.items()}

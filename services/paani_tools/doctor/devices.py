@@ -51,16 +51,12 @@ def _webcam(config: Config, index: int) -> Verdict:
 
 def check_serial(config: Config) -> Iterator[Verdict]:
     """Every line that is set: there, and ours to read and write."""
-    sensors = config.sensors
     lines = {
         "bridge.line": config.bridge.line,
         "thrusters.line": config.thrusters.line,
         "thrusters.autopilot.line": config.thrusters.autopilot.line,
         "plant.pwm_line": config.plant.pwm_line,
-        "sensors.gps.line": sensors.gps.line,
-        "sensors.imu.line": sensors.imu.line,
-        "sensors.heading.line": sensors.heading.line,
-        "sensors.ais.line": sensors.ais.line,
+        **{f"sensors.{role}.line": line for role, line in config.sensors.lines.items()},
     }
     if not any(lines.values()):
         yield passed("no line is set")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Literal
 
 import msgspec
@@ -63,10 +64,14 @@ class SensorDevicesConfig(Section, frozen=True):
     # because a wrong one turns the boat.
     variation_deg: Degrees | None = None
 
+    @property
+    def lines(self) -> Mapping[str, str]:
+        """The line of each device by its role, "" where none is named."""
+        return {"gps": self.gps.line, "imu": self.imu.line, "heading": self.heading.line, "ais": self.ais.line}
+
     def __post_init__(self) -> None:
         """Every line is one that can be opened."""
-        for name in ("gps", "imu", "heading", "ais"):
-            line = getattr(self, name).line
+        for name, line in self.lines.items():
             try:
                 require_line(line)
             except ValueError as error:

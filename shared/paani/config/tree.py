@@ -191,14 +191,9 @@ class Config(Section, frozen=True):
 
     def _require_lines(self) -> None:
         """A line has one user, and a recording guides no boat that moves."""
-        sensors, autopilot = self.sensors, self.thrusters.autopilot.line
-        devices = {
-            "sensors.gps.line": sensors.gps.line,
-            "sensors.imu.line": sensors.imu.line,
-            "sensors.heading.line": sensors.heading.line,
-            "sensors.ais.line": sensors.ais.line,
-        }
-        for name, line in devices.items():
+        autopilot = self.thrusters.autopilot.line
+        for role, line in self.sensors.lines.items():
+            name = f"sensors.{role}.line"
             for other, taken in (
                 ("bridge.line", self.bridge.line),
                 ("thrusters.line", self.thrusters.line),
