@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
@@ -17,7 +17,6 @@ from paani_services.navigator.avoidance.clearance import predicted_clearance_m
 from paani_services.navigator.mapping.ais_targets import (
     MAX_TARGETS,
     POSITION_STD_M,
-    UNKNOWN_LENGTH_M,
     AisTarget,
     locate_targets,
     predict_unseen_targets,
@@ -65,7 +64,7 @@ def test_a_vessel_has_gone_on_since_it_spoke_and_lies_along_its_course() -> None
 
 def test_who_does_not_tell_its_size_is_taken_to_be_large() -> None:
     [target] = located(vessel(-30.0, 0.0, to_bow_m=0.0, to_stern_m=0.0, to_port_m=0.0, to_starboard_m=0.0))
-    assert target.length_m == UNKNOWN_LENGTH_M
+    assert (target.length_m, target.beam_m) == (20.0, 5.0)
 
 
 @pytest.mark.parametrize(
@@ -91,6 +90,8 @@ def test_of_a_crowd_the_nearest_count() -> None:
 
 
 @given(st.floats(-math.pi, math.pi), st.floats(3.0, 60.0))
+@example(math.radians(34.5), 20.0)
+@example(math.radians(-35.5), 20.0)
 def test_what_the_camera_looks_at_is_left_to_it(bearing_rad: float, away_m: float) -> None:
     at = (100.0 + away_m * math.cos(bearing_rad), 50.0 + away_m * math.sin(bearing_rad))
     found = unseen(AisTarget(1, *at, 0.0, 2.0, 14.0, 3.0, 0.0))
