@@ -69,7 +69,7 @@ def words_of(sets: tuple[str, ...], *more: str) -> list[str]:
 
 
 def test_a_drive_on_the_river(tmp_path: Path, private_sets: tuple[str, ...]) -> None:
-    """The summary has what it promises, perception keeps up, and the boat moves."""
+    """The summary has what it promises, and the boat moves."""
     file = tmp_path / "s.json"
     up = Up(tmp_path, *words_of(private_sets, "--headless", "--for", "12", "--summary", str(file)))
     assert up.process.wait(READY_S + 30) == 0, (up.out, up.errors)
@@ -90,7 +90,6 @@ def test_a_drive_on_the_river(tmp_path: Path, private_sets: tuple[str, ...]) -> 
         assert 0 < stage["p50"] <= stage["p95"] <= stage["p99"]
     assert set(summary["decisions"]) == {d.value for d in m.Direction}
     assert sum(summary["decisions"].values()) == sum(summary["reasons"].values()) > 36
-    assert summary["services"]["perception"]["rate_hz"] >= 4.0
     assert summary["distance_m"] > 2.0
     assert summary["collisions"] == 0
     assert isinstance(summary["drops"], dict)
