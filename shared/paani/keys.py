@@ -178,6 +178,10 @@ AIS = Topic(
     name="sensors/ais", type=m.AisVessels, producer="plant", rate_hz=1.0, fresh_s=3.0,
     stance=Stance.STATE, summary="vessels that tell their position by AIS, as the receiver heard them",
 )
+SCAN = Topic(
+    name="sensors/scan", type=m.RangeScan, producer="plant", rate_hz=5.0, fresh_s=1.0,
+    stance=Stance.STATE, summary="ranges all round of a planar scanner, where the boat has one",
+)
 THRUST_APPLIED = Topic(
     name="plant/thrust_applied", type=m.ThrustApplied, producer="plant", rate_hz=20.0, fresh_s=0.5,
     stance=Stance.STATE, summary="what the thrust adapter applies, and why not",
@@ -252,7 +256,7 @@ ASKED: tuple[Topic[Any], ...] = (*REQUESTS.values(), *MISSION_REQUESTS.values(),
 TOPICS: tuple[Topic[Any], ...] = (
     PICTURE, RENDERED, MASK, EVIDENCE, TRACKS, ADVISORY, COMMAND, ROUTE, MISSION, PREDICTION, OCCUPANCY, THRUST,
     LOCAL_ODOMETRY, ODOMETRY, ARMING, OPERATOR_STATE, OPERATOR_ORDER, ORDERED_MISSION, TUNING, SHADOW, SIM_TIME, GPS,
-    IMU, AIS, THRUST_APPLIED, THRUSTERS_STATE, TRUE_POSE, BRIDGE_STATE, SENSORS_STATE, RECORDER_STATE,
+    IMU, AIS, SCAN, THRUST_APPLIED, THRUSTERS_STATE, TRUE_POSE, BRIDGE_STATE, SENSORS_STATE, RECORDER_STATE,
     *ASKED, *STEPS.values(),
 )
 # fmt: on
@@ -268,6 +272,7 @@ PRODUCERS: Mapping[Graph, Mapping[str, str]] = {
         GPS.name: "sensors",
         IMU.name: "sensors",
         AIS.name: "sensors",
+        SCAN.name: "sensors",
         RENDERED.name: NOBODY,
         TRUE_POSE.name: NOBODY,
     },

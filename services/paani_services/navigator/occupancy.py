@@ -8,9 +8,9 @@ from paani import messages as m
 from paani.config import NavigatorConfig
 from paani.occupancy_cells import pack_cells
 from paani_services.navigator.avoidance.replanning import PlannerState
-from paani_services.navigator.mapping.dynamic_obstacles import map_water
 from paani_services.navigator.mapping.observed_cells import CELL_M, Camera
 from paani_services.navigator.mapping.occupancy_grid import GRID_CELLS
+from paani_services.navigator.mapping.water_map import map_water
 
 
 def occupancy_around(

@@ -17,11 +17,11 @@ from paani.statistics.order_statistics import nearest_rank
 from paani_services.navigator.avoidance.planner import plan_motion
 from paani_services.navigator.avoidance.request import PlanRequest
 from paani_services.navigator.avoidance.rollout import BoatState, GuidanceSetpoint, Plan
-from paani_services.navigator.mapping.dynamic_obstacles import map_water
 from paani_services.navigator.mapping.observation import ObservationMemory, update_memory
 from paani_services.navigator.mapping.observed_cells import Camera
 from paani_services.navigator.mapping.occupancy_grid import LEVEL_POSE
 from paani_services.navigator.mapping.projection import PinholeCamera, pinhole_at
+from paani_services.navigator.mapping.water_map import map_water
 from paani_tools.replay.compatibility import provenance_of
 from paani_tools.replay.ledger import Ledger
 from paani_tools.replay.recompute import Recomputation

@@ -37,6 +37,7 @@ class SensorsConfig(Section, frozen=True):
     compass_noise_rad: NonNegative = 0.01  # of one sample
     compass_bias_std_rad: NonNegative = 0.02  # constant over a drive, drawn at its start
     ais: bool = True  # whether the boat has a receiver
+    lidar: bool = False  # whether it has a range scanner, which costs as much as the board
 
 
 class AdapterConfig(Section, frozen=True):

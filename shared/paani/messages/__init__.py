@@ -65,6 +65,7 @@ from paani.messages.prediction import (
     MovingObstacle,
     Prediction,
 )
+from paani.messages.range_scan import RangeScan
 from paani.messages.recorder import RecordedTopic, RecorderState
 from paani.messages.sensors import SensorDevice, SensorRole, SensorsState, SensorStatus
 from paani.messages.thrusters import ReceiverState, ThrustersState, ThrustHold
@@ -140,6 +141,7 @@ __all__ = [
     "Prediction",
     "Pulse",
     "Purpose",
+    "RangeScan",
     "Reason",
     "ReceiverState",
     "RecordedTopic",

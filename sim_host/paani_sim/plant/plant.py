@@ -15,6 +15,7 @@ from paani_sim.plant.actors import Actors
 from paani_sim.plant.ais import AisReceiver
 from paani_sim.plant.dynamics import Attitude, Fans, HullState, apply_fan_lag, attitude, body_velocity, compute_wrench
 from paani_sim.plant.instrument_faults import apply_gps_jump, apply_gps_outage, apply_imu_bias, apply_thruster_loss
+from paani_sim.plant.lidar import RangeScanner
 from paani_sim.plant.sensors import (
     GpsReading,
     ImuReading,
@@ -88,12 +89,15 @@ class Plant:
         self._mocap = [self._model.body(actor.id).mocapid[0] for actor in world.actors]
         self._vessels = [index for index, actor in enumerate(world.actors) if makes_waves(actor)]
 
-        biases, gps, imu, water, ais = np.random.SeedSequence(seed).spawn(5)
+        biases, gps, imu, water, ais, lidar = np.random.SeedSequence(seed).spawn(6)
         self._gps_rng, self._imu_rng = np.random.default_rng(gps), np.random.default_rng(imu)
         self._errors = initial_errors(config.sensors, np.random.default_rng(biases))
         self._water = Water(world, self._vessel, len(self._vessels), water)
         origin_deg = (world.origin_lat_deg, world.origin_lon_deg)
         self._ais = AisReceiver(world.actors, origin_deg, np.random.default_rng(ais))
+        self._scanner = RangeScanner(
+            self._model, boat, self._vessel.buoyancy.equilibrium_z_m, np.random.default_rng(lidar)
+        )
         self._last_fix = GpsReading(world.origin_lat_deg, world.origin_lon_deg, 0.0, 0.0, 0.0, fix=False)
 
         self.steps = 0
@@ -198,6 +202,10 @@ class Plant:
     def read_ais(self, now_us: int) -> tuple[AisVessel, ...]:
         """The vessels that an AIS receiver has heard, dated by `now_us`; to be read once a second."""
         return self._ais.hear(self._actors.poses, self._actors.speeds_mps, self.sim_us * 1e-6, now_us)
+
+    def read_lidar(self) -> tuple[float, ...]:
+        """The ranges of one turn of the scanner [m], 0 where nothing was met; see `RangeScanner`."""
+        return self._scanner.scan(self._data)
 
     def state_hash(self) -> str:
         """SHA-256 of position and velocity, to compare runs bit by bit."""

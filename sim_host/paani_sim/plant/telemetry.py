@@ -5,6 +5,7 @@ from paani import messages as m
 from paani.bus import Bus
 from paani.config import PlantConfig
 from paani.messages.ais import MAX_VESSELS
+from paani_sim.plant import lidar
 from paani_sim.plant.plant import Plant
 
 
@@ -35,6 +36,18 @@ def imu_message(plant: Plant, source_us: int) -> m.ImuSample:
 def ais_message(plant: Plant, source_us: int) -> m.AisVessels:
     """Read the AIS receiver."""
     return m.AisVessels(source_us=source_us, vessels=plant.read_ais(source_us)[:MAX_VESSELS])
+
+
+def scan_message(plant: Plant, source_us: int) -> m.RangeScan:
+    """Read the range scanner."""
+    return m.RangeScan(
+        source_us=source_us,
+        ranges_m=plant.read_lidar(),
+        first_bearing_rad=lidar.FIRST_BEARING_RAD,
+        step_rad=lidar.STEP_RAD,
+        max_range_m=lidar.MAX_RANGE_M,
+        forward_m=lidar.FORWARD_M,
+    )
 
 
 def pose_message(plant: Plant, source_us: int) -> m.TruePose:
@@ -70,10 +83,12 @@ class Measurements:
     def __init__(self, bus: Bus, config: PlantConfig) -> None:
         self._gps, self._imu = bus.publisher(keys.GPS), bus.publisher(keys.IMU)
         self._ais, self._pose = bus.publisher(keys.AIS), bus.publisher(keys.TRUE_POSE)
+        self._scan = bus.publisher(keys.SCAN)
         rate_hz = 1.0 / config.step_s
         self._gps_every = max(1, round(rate_hz / config.sensors.gps_rate_hz))
         self._imu_every = max(1, round(rate_hz / config.sensors.imu_rate_hz))
         self._ais_every = max(1, round(rate_hz / keys.AIS.rate_hz)) if config.sensors.ais else 0
+        self._scan_every = max(1, round(rate_hz / keys.SCAN.rate_hz)) if config.sensors.lidar else 0
         self._pose_every = report_every(config)
 
     def publish(self, plant: Plant, source_us: int) -> None:
@@ -84,5 +99,7 @@ class Measurements:
             self._gps.put(gps_message(plant, source_us))
         if self._ais_every and plant.steps % self._ais_every == 0:
             self._ais.put(ais_message(plant, source_us))
+        if self._scan_every and plant.steps % self._scan_every == 0:
+            self._scan.put(scan_message(plant, source_us))
         if plant.steps % self._pose_every == 0:
             self._pose.put(pose_message(plant, source_us))

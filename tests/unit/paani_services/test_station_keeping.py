@@ -28,7 +28,7 @@ from paani_services.navigator.guidance.station_keeping import (
     hold_station,
     take_station,
 )
-from paani_services.navigator.mapping.dynamic_obstacles import map_water
+from paani_services.navigator.mapping.water_map import map_water
 from paani_services.navigator.navigate import navigate
 from paani_sim.eye.camera import BoatPose
 from tests.synthetic_water import (

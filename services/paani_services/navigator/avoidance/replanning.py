@@ -16,9 +16,9 @@ from paani_services.navigator.avoidance.request import PlanRequest
 from paani_services.navigator.avoidance.rollout import RESIDUAL_DRIFT_MPS, BoatState, GuidanceSetpoint, Plan
 from paani_services.navigator.avoidance.verdicts import tell_headings
 from paani_services.navigator.mapping.ais_targets import AisTarget, locate_targets, predict_unseen_targets
-from paani_services.navigator.mapping.dynamic_obstacles import is_refuted, map_water
 from paani_services.navigator.mapping.observation import ObservationMemory, add_track_ids, update_memory
 from paani_services.navigator.mapping.observed_cells import CELL_M, Camera
+from paani_services.navigator.mapping.water_map import is_refuted, map_water
 
 COURSE_TOLERANCE_RAD = math.radians(3.0)  # desired courses this near to each other share a plan
 PERSON_NEAR_M = 1.5  # `advisor.people.stop_m`: nobody is so near to fans that turn

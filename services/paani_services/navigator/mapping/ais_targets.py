@@ -93,7 +93,7 @@ def predict_unseen_targets(
     vessels = [each for each in seen if each.label is Label.VESSEL and each.is_moving]
     unseen = []
     for target in targets:
-        bearing_rad = math.atan2(target.north_m - boat[1], target.east_m - boat[0])
+        bearing_rad = portable.atan2(target.north_m - boat[1], target.east_m - boat[0])
         if abs(wrap_rad(bearing_rad - boat[2])) > half_view_rad and not any(
             _hull_distance_m(target, each) <= ALIKE_M for each in vessels
         ):

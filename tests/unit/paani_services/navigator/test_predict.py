@@ -14,7 +14,7 @@ from paani_services.navigator.avoidance.fence_cells import apply_fence
 from paani_services.navigator.avoidance.replanning import PlannerState, explain_plan, observe, replan
 from paani_services.navigator.avoidance.rollout import BoatState, GuidanceSetpoint, Plan
 from paani_services.navigator.guidance.mission_progress import MissionProgress
-from paani_services.navigator.mapping.dynamic_obstacles import map_water
+from paani_services.navigator.mapping.water_map import map_water
 from paani_services.navigator.navigate import NavigatorState
 from paani_services.navigator.predict import predict
 from paani_sim.eye.camera import BoatPose

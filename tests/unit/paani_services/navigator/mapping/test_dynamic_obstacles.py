@@ -15,11 +15,11 @@ from paani_services.navigator.avoidance.clearance import predicted_clearance_m
 from paani_services.navigator.mapping.dynamic_obstacles import (
     DynamicObstacle,
     find_dynamic_obstacles,
-    is_refuted,
 )
 from paani_services.navigator.mapping.observation import ObservationMemory
 from paani_services.navigator.mapping.occupancy_grid import build_occupancy_grid
 from paani_services.navigator.mapping.velocity_fit import Velocity
+from paani_services.navigator.mapping.water_map import is_refuted
 from paani_sim.eye.camera import BoatPose, project
 from tests.synthetic_water import (
     AT_REST,

@@ -1,0 +1,38 @@
+"""The water around a position: the occupancy grid, and what moves on it. Pure."""
+
+import numpy as np
+
+from paani.config import PlannerConfig
+from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle, find_dynamic_obstacles
+from paani_services.navigator.mapping.observation import Observation
+from paani_services.navigator.mapping.observed_cells import CELL_M, Camera
+from paani_services.navigator.mapping.occupancy_grid import GRID_CELLS, BoxIds, OccupancyGrid, build_occupancy_grid
+
+MIN_UNSEEN_S = 1.0  # five pictures
+
+
+def map_water(
+    observations: tuple[Observation, ...],
+    position_m: tuple[float, float],
+    now_us: int,
+    camera: Camera,
+    config: PlannerConfig,
+) -> tuple[OccupancyGrid, tuple[DynamicObstacle, ...]]:
+    """The grid around a position, and the dynamic obstacles, which are not on it."""
+    obstacles = find_dynamic_obstacles(observations, now_us, camera, config) if config.predict else ()
+    boxes: BoxIds = frozenset().union(*(obstacle.vacated_boxes for obstacle in obstacles))
+    grid = build_occupancy_grid(observations, position_m, now_us, camera, config, boxes)
+    return grid, tuple(obstacle for obstacle in obstacles if not is_refuted(obstacle, grid))
+
+
+def is_refuted(obstacle: DynamicObstacle, grid: OccupancyGrid) -> bool:
+    """Whether the pictures show water everywhere an obstacle should be that is out of sight: it did not go on.
+
+    That counts after `MIN_UNSEEN_S` out of sight.
+    """
+    if obstacle.age_s < MIN_UNSEEN_S:
+        return False
+    column = np.floor((obstacle.east_m - grid.west_m) / CELL_M).astype(np.int64)
+    row = np.floor((obstacle.north_m - grid.south_m) / CELL_M).astype(np.int64)
+    on_grid = (column >= 0) & (column < GRID_CELLS) & (row >= 0) & (row < GRID_CELLS)
+    return bool(on_grid.all() and grid.free[row, column].all())
