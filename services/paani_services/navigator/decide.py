@@ -37,6 +37,7 @@ def decide(
         order=ordered.message,
         order_us=ordered.received_us,
         ais=inputs[keys.AIS.name].message,
+        scan=inputs[keys.SCAN.name].message,
     )
     camera = Camera(config.calibration, config.perception.ego_polygon)
     state, command = follow_order(
@@ -72,6 +73,7 @@ DECIDER = Decider(
         keys.ARMING,
         keys.OPERATOR_ORDER,
         keys.AIS,
+        keys.SCAN,
     ),
     own=(keys.ROUTE, keys.MISSION),
     outputs=(keys.COMMAND,),

@@ -14,6 +14,7 @@ from paani.messages import (
     Inhibit,
     Odometry,
     OperatorOrder,
+    RangeScan,
     SimTime,
     Tracks,
 )
@@ -35,6 +36,7 @@ class NavigatorInputs(msgspec.Struct, frozen=True):
     order: OperatorOrder | None = None
     order_us: int = 0
     ais: AisVessels | None = None
+    scan: RangeScan | None = None
 
 
 def is_out_of_date(stamp_us: int, limit_s: float, now_us: int, config: NavigatorConfig) -> bool:

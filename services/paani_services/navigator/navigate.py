@@ -194,7 +194,9 @@ def begin_step(
         state = msgspec.structs.replace(state, station=None)  # it lies by dead reckoning, which may have begun anew
     state = _end_visual_turn(state, inputs)
     if config.planner.acts_on(camera.calibration):
-        planner_state = observe(state.planner_state, inputs.odometry, inputs.evidence, config.planner, inputs.tracks)
+        planner_state = observe(
+            state.planner_state, inputs.odometry, inputs.evidence, config.planner, inputs.tracks, inputs.scan
+        )
         state = msgspec.structs.replace(state, planner_state=planner_state)
     return state, inhibits
 

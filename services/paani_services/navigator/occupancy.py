@@ -25,7 +25,7 @@ def occupancy_around(
         return None
     if odometry is None or not odometry.healthy:
         return None
-    grid, _ = map_water(observations, (here.x_m, here.y_m), now_us, camera, config.planner)
+    grid, _ = map_water(observations, (here.x_m, here.y_m), now_us, camera, config.planner, planner.memory.scans)
     cells = np.full(grid.occupied.shape, m.Occupancy.UNKNOWN, np.uint8)
     cells[grid.free] = m.Occupancy.FREE
     cells[grid.blind_zone] = m.Occupancy.BLIND_ZONE

@@ -24,6 +24,7 @@ from paani_services.navigator.avoidance.rollout import BoatState, roll_out
 from paani_services.navigator.mapping.ais_targets import predict_unseen_targets
 from paani_services.navigator.mapping.dynamic_obstacles import find_dynamic_obstacles
 from paani_services.navigator.mapping.observed_cells import Camera
+from paani_services.navigator.mapping.scanned_obstacles import scan_water
 from paani_services.navigator.navigate import NavigatorState
 
 PLAN_MAX_AGE_US = 1_000_000  # of a plan whose reasons are told; the boat is not steered by an older one
@@ -112,15 +113,17 @@ def _encounters(
     """Those with the obstacles that the plan was made for."""
     is_old = has_passed(planner.planned_us, PLAN_MAX_AGE_US, now_us)
     targets = planner.basis.targets if planner.basis is not None and not is_old else ()
-    if not planner.obstacle_track_ids and not targets:
+    scanned = scan_water(planner.memory.scans, now_us, config.planner)
+    met = scanned.obstacles if scanned is not None and not is_old else ()
+    if not planner.obstacle_track_ids and not targets and not met:
         return []
     classes = {(each.track_id, each.mmsi): each.encounter for each in before.obstacles} if before is not None else {}
     seen = find_dynamic_obstacles(planner.memory.observations, now_us, camera, config.planner)
     unseen = predict_unseen_targets(targets, seen, boat[:3], camera.calibration)
     return [
         assess_encounter(each, boat, classes.get((each.track_id, each.mmsi), EncounterClass.NONE))
-        for each in (*seen, *unseen)
-        if each.mmsi or each.track_id in planner.obstacle_track_ids
+        for each in (*seen, *met, *unseen)
+        if each.mmsi or each.is_scanned or each.track_id in planner.obstacle_track_ids
     ]
 
 
@@ -142,4 +145,5 @@ def _on_map(encounter: Encounter, boat: BoatState, odometry: Odometry) -> Moving
         tcpa_s=encounter.approach.tcpa_s,
         encounter=encounter.kind,
         mmsi=obstacle.mmsi,
+        is_scanned=obstacle.is_scanned,
     )

@@ -72,6 +72,7 @@ class PlannerConfig(Section, frozen=True):
     `look_m`: obstacles that far along a path, but beyond `horizon_s`, add to the cost and forbid nothing.
     `predict`: dynamic obstacles count where they are predicted to be. Velocities are fitted over `fit_s`, up to
     `mover_range_m` away, and predict an obstacle for `unseen_s` out of sight.
+    `scan_max_age_s`: of a range scan whose echoes are obstacles; 0: none is.
     `ais_max_age_s`: of what a vessel told of itself by AIS, to be counted where the camera does not look; 0: never.
     `patience_s`: the longest that the boat waits for dynamic obstacles to pass.
     `person_near_m`, `vessel_near_m`: room kept free around dynamic obstacles. `lead_s`: candidates that come near where
@@ -101,6 +102,7 @@ class PlannerConfig(Section, frozen=True):
     mover_range_m: Positive = 20.0  # one row of the picture is 1.8 m there, and a barge is there in 9 s
     fit_s: Positive = 2.5
     unseen_s: NonNegative = 30.0
+    scan_max_age_s: NonNegative = 0.5  # two turns of the slowest scanner, and one that is lost
     ais_max_age_s: NonNegative = 20.0  # a class A transponder speaks every 10 s, and one report may be lost
     patience_s: NonNegative = 15.0  # in which a swimmer at ease passes 6 m
     lead_s: NonNegative = 2.0

@@ -29,8 +29,9 @@ class MovingObstacle(msgspec.Struct, frozen=True, kw_only=True):
     """A dynamic obstacle that the plan in force was made for: its middle now, its half width, and its velocity.
 
     track_id: the advisor's track, 0 without one. mmsi: of a vessel that told of itself by AIS, where the camera does
-    not look; 0 of what was seen. velocity_std_mps: standard deviation, of a person who may swim alone. age_s: since it
-    was last seen; within that time its place is predicted.
+    not look; 0 of what was seen. is_scanned: met by the beams of a range scanner, and no track of the camera's.
+    velocity_std_mps: standard deviation, of a person who may swim alone. age_s: since it was last seen; within that
+    time its place is predicted.
     tcpa_s, cpa_m: when, by the present velocities of both, its outline will be nearest to the boat's middle, and how
     near; cpa_std_m: standard deviation of that. Unset where they were not computed.
     encounter: how the two meet, from when their closest point is too near until they are past it.
@@ -49,6 +50,7 @@ class MovingObstacle(msgspec.Struct, frozen=True, kw_only=True):
     tcpa_s: NonNegative | msgspec.UnsetType = msgspec.UNSET
     encounter: EncounterClass = EncounterClass.NONE
     mmsi: Mmsi = 0
+    is_scanned: bool = False
 
 
 class Constraint(StrEnum):

@@ -8,7 +8,7 @@ from paani.clock import has_passed
 from paani.config import PlannerConfig
 from paani.fence_geometry import Fence
 from paani.geometry import wrap_rad
-from paani.messages import AisVessels, Evidence, HeadingVerdict, Odometry, Tracks
+from paani.messages import AisVessels, Evidence, HeadingVerdict, Odometry, RangeScan, Tracks
 from paani.motion_planning import MotionPlanner, MovingObstacle, PlanningInputs
 from paani_services.navigator.avoidance.fence_cells import apply_fence
 from paani_services.navigator.avoidance.planner import judge_candidates, plan_motion
@@ -28,6 +28,7 @@ class PlanBasis(msgspec.Struct, frozen=True, kw_only=True):
     """What a plan was requested with beside the course and the water, so that the request can be made again.
 
     map_offset_m: east and north of the boat in the map, less those by dead reckoning. targets: vessels told by AIS.
+    scan_us: stamp of the newest range scan; -1 without one.
     """
 
     start: BoatState
@@ -38,6 +39,7 @@ class PlanBasis(msgspec.Struct, frozen=True, kw_only=True):
     map_offset_m: tuple[float, float]
     escape_mps: float = 0.0
     targets: tuple[AisTarget, ...] = ()
+    scan_us: int = -1
 
 
 class PlannerState(
@@ -72,9 +74,10 @@ def observe(
     evidence: Evidence | None,
     config: PlannerConfig,
     tracks: Tracks | None = None,
+    scan: RangeScan | None = None,
 ) -> PlannerState:
-    """Add the newest odometry, the newest evidence if it is of a new frame, and its tracks to the planner's memory."""
-    memory = update_memory(state.memory, odometry, evidence, config)
+    """Add the newest odometry, evidence and its tracks if it is of a new frame, and scan to the planner's memory."""
+    memory = update_memory(state.memory, odometry, evidence, config, scan)
     return msgspec.structs.replace(state, memory=add_track_ids(memory, evidence, tracks))
 
 
@@ -112,6 +115,7 @@ def replan(
             map_offset_m=(odometry.x_m - here.x_m, odometry.y_m - here.y_m),
             escape_mps=setpoint.escape_mps,
             targets=locate_targets(ais, odometry, here, now_us, config),
+            scan_us=state.memory.scans[-1].stamp_us if state.memory.scans else -1,
         )
         request = _request_plan(state.memory, basis, setpoint, now_us, camera, config, fence)
         plan = plan_motion(request) if planner is None else Plan(*planner(_planning_inputs(request)))
@@ -160,7 +164,8 @@ def _request_plan(
 ) -> PlanRequest:
     """The request on the water as it is remembered: the grid ends at the fence."""
     start = basis.start
-    grid, seen = map_water(memory.observations, start[:2], now_us, camera, config)
+    scans = tuple(each for each in memory.scans if each.stamp_us <= basis.scan_us)
+    grid, seen = map_water(memory.observations, start[:2], now_us, camera, config, scans)
     unseen = predict_unseen_targets(basis.targets, seen, start[:3], camera.calibration)
     return PlanRequest(
         grid=apply_fence(grid, fence, basis.map_offset_m),

@@ -15,7 +15,7 @@ from paani.config import CalibrationConfig, PlannerConfig
 from paani.geometry import enu_from_geodetic, wrap_rad
 from paani.messages import AisVessel, AisVessels, Label, Odometry
 from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle
-from paani_services.navigator.mapping.observation import StampedPose
+from paani_services.navigator.mapping.stamped_pose import StampedPose
 from paani_services.navigator.mapping.velocity_fit import Velocity
 
 UNDER_WAY_MPS = 0.25  # half a knot; what lies is the camera's to see, as the position is not good enough to pass it

@@ -37,6 +37,7 @@ class DynamicObstacle(NamedTuple):
     vacated_boxes: boxes that show it where it is no more. Where it was within `free_s` of when it was last seen stays
     occupied. track_id: the advisor's track that it was last seen as; 0: unknown. label: what the detector takes it for.
     mmsi: of a vessel that is known by AIS alone; 0: seen. position_std_m: of its outline when that was known.
+    is_scanned: met by a range scanner's beams.
     """
 
     east_m: F64
@@ -49,6 +50,7 @@ class DynamicObstacle(NamedTuple):
     label: Label = Label.VESSEL
     mmsi: int = 0
     position_std_m: float = 0.0
+    is_scanned: bool = False
 
     @property
     def is_moving(self) -> bool:
@@ -111,7 +113,7 @@ def _estimate_drift(track: list[PositionMeasurement], complete: list[PositionMea
     """
     estimates = [_fit_recent(complete, track[-1].stamp_us)]
     if not track[-1].is_whole:
-        estimates += [_fit_recent(_measurements_of_end(track, end), track[-1].stamp_us) for end in (0, 1)]
+        estimates += [_fit_recent(measurements_of_end(track, end), track[-1].stamp_us) for end in (0, 1)]
     known = [each for each in estimates if each is not None]
     velocity = velocity_if_significant(max(known, key=lambda each: each.squared_significance, default=None))
     if velocity is None:
@@ -129,7 +131,7 @@ def _fit_recent(measurements: list[PositionMeasurement], last_us: int) -> Veloci
     return fit_velocity(measurements, DRIFT_FIT_S)
 
 
-def _measurements_of_end(track: list[PositionMeasurement], end: int) -> list[PositionMeasurement]:
+def measurements_of_end(track: list[PositionMeasurement], end: int) -> list[PositionMeasurement]:
     """The measurements that show the left end (0) or the right end (1), with that end as their position."""
     return [
         each._replace(position_m=(float(each.outline[0][-end]), float(each.outline[1][-end])))

@@ -12,9 +12,10 @@ import msgspec
 
 from paani import portable
 from paani.config import PlannerConfig
-from paani.geometry import wrap_rad
-from paani.messages import Detection, Evidence, Label, Odometry, TimeBase, Tracks
+from paani.messages import Detection, Evidence, Label, Odometry, RangeScan, TimeBase, Tracks
 from paani_services.navigator.mapping.projection import Pose
+from paani_services.navigator.mapping.range_scans import Scan, add_scan
+from paani_services.navigator.mapping.stamped_pose import StampedPose, interpolate_pose
 
 EDGE_STEPS = 128  # of the picture's height, in which the water edge is stored: two for each row of the mask
 BOX_STEPS = 512  # of the picture's width and height, in which boxes are stored
@@ -32,17 +33,6 @@ CARRIER_LABELS = frozenset({Label.VESSEL, Label.PIER})  # a person may stand on 
 MASK_ROW_FRAC = 1.0 / 64.0  # a row of the mask, of the picture's height
 # Rows of the mask between the end of the water and the foot of a person ashore: less may be a reflection.
 MIN_ASHORE_ROWS = 3.0
-
-
-class StampedPose(msgspec.Struct, frozen=True, rename={"stamp_us": "at_us"}):
-    """Dead-reckoned position and attitude of the boat at one time. It is recorded under the field names of `rename`."""
-
-    stamp_us: int
-    x_m: float
-    y_m: float
-    yaw_rad: float
-    roll_rad: float
-    pitch_rad: float
 
 
 class FootLine(msgspec.Struct, frozen=True, array_like=True):
@@ -123,17 +113,23 @@ class ObservationMemory(
     observations: tuple[Observation, ...] = ()
     frame_id: tuple[int, int] = (-1, -1)
     epoch: int = -1
+    scans: tuple[Scan, ...] = ()
 
 
 def update_memory(
-    memory: ObservationMemory, odometry: Odometry | None, evidence: Evidence | None, config: PlannerConfig
+    memory: ObservationMemory,
+    odometry: Odometry | None,
+    evidence: Evidence | None,
+    config: PlannerConfig,
+    scan: RangeScan | None = None,
 ) -> ObservationMemory:
-    """Add the newest odometry and evidence.
+    """Add the newest odometry, evidence and range scan.
 
     Another odometry epoch, no odometry for `max_reckon_s`, or a clock that was set back forgets all observations.
     """
     if odometry is not None and odometry.healthy:
         memory = _add_pose(memory, odometry, config)
+    memory = msgspec.structs.replace(memory, scans=add_scan(memory.scans, scan, memory.poses, config))
     if evidence is None or (evidence.frame_epoch, evidence.frame_seq) == memory.frame_id:
         return memory
     memory = msgspec.structs.replace(memory, frame_id=(evidence.frame_epoch, evidence.frame_seq))
@@ -158,27 +154,6 @@ def is_free_space_evidence(evidence: Evidence) -> bool:
         and evidence.height_px > 0
         and len(evidence.water_edge) > 0
     )
-
-
-def interpolate_pose(poses: tuple[StampedPose, ...], stamp_us: int, max_gap_s: float) -> StampedPose | None:
-    """The pose at a time, between the two around it, or the nearest; None if that is more than `max_gap_s` off."""
-    if not poses:
-        return None
-    nearest = min(poses, key=lambda pose: abs(pose.stamp_us - stamp_us))
-    if abs(nearest.stamp_us - stamp_us) * 1e-6 > max_gap_s:
-        return None
-    for before, after in itertools.pairwise(poses):
-        if before.stamp_us <= stamp_us <= after.stamp_us and after.stamp_us > before.stamp_us:
-            part = (stamp_us - before.stamp_us) / (after.stamp_us - before.stamp_us)
-            return StampedPose(
-                stamp_us,
-                before.x_m + part * (after.x_m - before.x_m),
-                before.y_m + part * (after.y_m - before.y_m),
-                before.yaw_rad + part * wrap_rad(after.yaw_rad - before.yaw_rad),
-                before.roll_rad + part * (after.roll_rad - before.roll_rad),
-                before.pitch_rad + part * (after.pitch_rad - before.pitch_rad),
-            )
-    return nearest
 
 
 def _add_pose(memory: ObservationMemory, odometry: Odometry, config: PlannerConfig) -> ObservationMemory:

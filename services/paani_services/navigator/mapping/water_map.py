@@ -7,6 +7,8 @@ from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle, 
 from paani_services.navigator.mapping.observation import Observation
 from paani_services.navigator.mapping.observed_cells import CELL_M, Camera
 from paani_services.navigator.mapping.occupancy_grid import GRID_CELLS, BoxIds, OccupancyGrid, build_occupancy_grid
+from paani_services.navigator.mapping.range_scans import Scan
+from paani_services.navigator.mapping.scanned_obstacles import mark_echoes, scan_water
 
 MIN_UNSEEN_S = 1.0  # five pictures
 
@@ -17,12 +19,15 @@ def map_water(
     now_us: int,
     camera: Camera,
     config: PlannerConfig,
+    scans: tuple[Scan, ...] = (),
 ) -> tuple[OccupancyGrid, tuple[DynamicObstacle, ...]]:
-    """The grid around a position, and the dynamic obstacles, which are not on it."""
+    """The grid around a position, and the dynamic obstacles, which are not on it, by pictures and scans."""
     obstacles = find_dynamic_obstacles(observations, now_us, camera, config) if config.predict else ()
     boxes: BoxIds = frozenset().union(*(obstacle.vacated_boxes for obstacle in obstacles))
     grid = build_occupancy_grid(observations, position_m, now_us, camera, config, boxes)
-    return grid, tuple(obstacle for obstacle in obstacles if not is_refuted(obstacle, grid))
+    seen = tuple(obstacle for obstacle in obstacles if not is_refuted(obstacle, grid))
+    scanned = scan_water(scans, now_us, config)
+    return (grid, seen) if scanned is None else (mark_echoes(grid, scanned), (*seen, *scanned.obstacles))
 
 
 def is_refuted(obstacle: DynamicObstacle, grid: OccupancyGrid) -> bool:

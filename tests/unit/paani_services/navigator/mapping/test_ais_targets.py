@@ -22,7 +22,7 @@ from paani_services.navigator.mapping.ais_targets import (
     predict_unseen_targets,
 )
 from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle
-from paani_services.navigator.mapping.observation import StampedPose
+from paani_services.navigator.mapping.stamped_pose import StampedPose
 from paani_services.navigator.mapping.velocity_fit import Velocity
 from paani_sim.eye.camera import BoatPose
 from tests.synthetic_water import PLANNER, START_US, odometry

@@ -13,12 +13,12 @@ from paani.messages import Odometry, SegmentationSource, TimeBase
 from paani_services.navigator.mapping.observation import (
     OLD_OBSERVATIONS,
     ObservationMemory,
-    interpolate_pose,
     is_free_space_evidence,
     update_memory,
 )
 from paani_services.navigator.mapping.observed_cells import project_to_cells
 from paani_services.navigator.mapping.occupancy_grid import OccupancyGrid, build_occupancy_grid
+from paani_services.navigator.mapping.stamped_pose import interpolate_pose
 from paani_sim.eye.camera import BoatPose
 from tests.synthetic_water import AT_REST, CAMERA, PLANNER, START_US, evidence, observe_from, odometry, water_edge_of
 
