@@ -17,6 +17,7 @@ SPACING_US = 90_000  # between two remembered scans, at least
 MAX_SCANS = 48  # they span `fit_s` at 10 Hz, and more
 # The least angle between a beam and the surface that it meets at which the next beam's echo still belongs to it.
 LEAST_INCIDENCE_RAD = math.radians(10.0)
+GATE_M, GATE_MPS = 0.3, 3.5  # between two scans of one surface: its shape, and the fastest vessel (rowing eights)
 RANGE_STD_M = 0.03  # of one echo, of the common scanners
 
 
@@ -67,11 +68,16 @@ def add_scan(
 @functools.lru_cache(maxsize=MAX_SCANS)
 def beam_directions(scan: Scan) -> tuple[F64, F64]:
     """East and north of a unit vector along each beam [beams]."""
-    bearings_rad = [scan.first_rad + number * scan.step_rad for number in range(len(scan.ranges_cm) // 2)]
-    return (
-        np.array([portable.cos(each) for each in bearings_rad]),
-        np.array([portable.sin(each) for each in bearings_rad]),
-    )
+    ahead, aside = _directions_from_first(scan.step_rad, len(scan.ranges_cm) // 2)
+    cos, sin = portable.cos(scan.first_rad), portable.sin(scan.first_rad)
+    return ahead * cos - aside * sin, ahead * sin + aside * cos
+
+
+@functools.lru_cache(maxsize=4)
+def _directions_from_first(step_rad: float, count: int) -> tuple[F64, F64]:
+    """Along and across the first beam, of a unit vector along each [beams]."""
+    turns_rad = [number * step_rad for number in range(count)]
+    return np.array([portable.cos(each) for each in turns_rad]), np.array([portable.sin(each) for each in turns_rad])
 
 
 @functools.lru_cache(maxsize=MAX_SCANS)
@@ -80,6 +86,26 @@ def find_echoes(scan: Scan) -> tuple[F64, F64]:
     east, north = beam_directions(scan)
     ranges_m = scan.ranges_m
     return scan.x_m + ranges_m * east, scan.y_m + ranges_m * north
+
+
+@functools.lru_cache(maxsize=MAX_SCANS)
+def match_segments(before: Scan, after: Scan) -> dict[int, int]:
+    """For segments of one scan, by number, the one of the scan before whose echoes lie nearest to theirs.
+
+    None is further away than `GATE_M` and what the fastest vessel makes meanwhile. Two may go on from one: a hull whose
+    side breaks off at another place in every scan.
+    """
+    runs, later_runs = find_segments(before), find_segments(after)
+    if not runs or not later_runs:
+        return {}
+    east_m, north_m = (each[np.concatenate(runs)] for each in find_echoes(before))
+    later_east_m, later_north_m = (each[np.concatenate(later_runs)] for each in find_echoes(after))
+    off_east_m, off_north_m = later_east_m[:, None] - east_m, later_north_m[:, None] - north_m
+    square_m2 = off_east_m * off_east_m + off_north_m * off_north_m
+    first, later_first = ([0, *np.cumsum([run.size for run in each])[:-1]] for each in (runs, later_runs))
+    nearest_m2 = np.minimum.reduceat(np.minimum.reduceat(square_m2, later_first, axis=0), first, axis=1)
+    gate_m = GATE_M + GATE_MPS * (after.stamp_us - before.stamp_us) * 1e-6
+    return {number: int(row_m2.argmin()) for number, row_m2 in enumerate(nearest_m2) if row_m2.min() <= gate_m * gate_m}
 
 
 @functools.lru_cache(maxsize=MAX_SCANS)

@@ -12,8 +12,6 @@ import numpy as np
 from paani.arrays import F64, I64
 from paani.config import PlannerConfig
 from paani.messages import Label
-from paani_services.navigator.mapping.association import associate_measurements
-from paani_services.navigator.mapping.box_measurement import MeasuredPicture
 from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle, measurements_of_end
 from paani_services.navigator.mapping.observed_cells import CELL_M
 from paani_services.navigator.mapping.occupancy_grid import GRID_CELLS, NO_BOXES, OccupancyGrid
@@ -24,6 +22,7 @@ from paani_services.navigator.mapping.range_scans import (
     beam_directions,
     find_echoes,
     find_segments,
+    match_segments,
 )
 from paani_services.navigator.mapping.velocity_fit import PositionMeasurement, Velocity, estimate_velocity
 
@@ -32,7 +31,7 @@ POINT_SPACING_M, MAX_POINTS = 0.6, 24  # of an outline: no gap that a hull with 
 # Of what is longer the nearer end moves as it does, and its middle as more of it comes out from behind that end.
 LONG_M = 3.0
 FAR_PART = 0.9  # of the scanner's range; what ends beyond may go on
-THROUGH_S = 0.8  # before: in this time what moves at a walking pace leaves its own outline
+THROUGH_S = 0.8  # before, at least: in this time what moves at a walking pace leaves its own outline
 # By which a beam went further than a place, so that it was water: noise, and two deviations of the yaw.
 THROUGH_M, THROUGH_RAD = 0.25, 0.02
 MIN_THROUGH = 2  # points of an outline that lie where it was water
@@ -57,11 +56,10 @@ def scan_water(scans: tuple[Scan, ...], now_us: int, config: PlannerConfig) -> S
         return None
     newest = scans[-1]
     standing, obstacles = newest.ranges_m > 0.0, []
-    before = next((each for each in reversed(scans) if newest.stamp_us - each.stamp_us >= THROUGH_S * 1e6), None)
-    tracks = associate_measurements(map(measure_segments, scans), config.fit_s) if config.predict and before else []
-    for track in tracks:
+    before = scans[0] if newest.stamp_us - scans[0].stamp_us >= THROUGH_S * 1e6 else None
+    for track in _track_segments(scans) if config.predict else ():
         last = track[-1]
-        if last.stamp_us != newest.stamp_us or before is None or not _is_entering(last.outline, before):
+        if before is None or not _is_entering(last.outline, before):
             continue
         velocity = _estimate_velocity(track, newest, config)
         if velocity is not None:
@@ -83,16 +81,30 @@ def mark_echoes(grid: OccupancyGrid, water: ScannedWater) -> OccupancyGrid:
     )
 
 
+def _track_segments(scans: tuple[Scan, ...]) -> list[list[PositionMeasurement]]:
+    """The measurements of each segment of the newest scan that can be tracked, oldest first."""
+    tracks = []
+    for number, measurement in _measure_segments(scans[-1]).items():
+        track, at = [measurement], number
+        for before, after in zip(scans[-2::-1], scans[:0:-1], strict=True):
+            at = match_segments(before, after).get(at, -1)
+            earlier = _measure_segments(before).get(at)
+            if earlier is None:
+                break
+            track.append(earlier)
+        tracks.append(track[::-1])
+    return tracks
+
+
 @functools.lru_cache(maxsize=MAX_SCANS)
-def measure_segments(scan: Scan) -> MeasuredPicture:
-    """The segments of a scan as measurements of positions; `box_id` has the number of the segment."""
+def _measure_segments(scan: Scan) -> dict[int, PositionMeasurement]:
+    """The segments that can be tracked as measurements of positions, by their number."""
     ranges_m = scan.ranges_m
-    measured = [
-        _measure_segment(scan, number, beams, ranges_m)
+    return {
+        number: _measure_segment(scan, number, beams, ranges_m)
         for number, beams in enumerate(find_segments(scan))
-        if beams.size >= MIN_BEAMS and beams.size < ranges_m.size
-    ]
-    return MeasuredPicture(scan.stamp_us, measured)
+        if MIN_BEAMS <= beams.size < ranges_m.size
+    }
 
 
 def _measure_segment(scan: Scan, number: int, beams: I64, ranges_m: F64) -> PositionMeasurement:
@@ -112,7 +124,7 @@ def _measure_segment(scan: Scan, number: int, beams: I64, ranges_m: F64) -> Posi
         deviation_m,
         (east_m[chosen], north_m[chosen]),
         (_is_end(scan, int(beams[0]), 1, ranges_m), _is_end(scan, int(beams[-1]), -1, ranges_m)),
-        (length_m + 1.0, 1.0),
+        (length_m, 0.0),
     )
 
 
@@ -138,7 +150,7 @@ def _is_entering(outline: tuple[F64, F64], before: Scan) -> bool:
 def _estimate_velocity(track: list[PositionMeasurement], newest: Scan, config: PlannerConfig) -> Velocity | None:
     """That of the middle of what is short, of the nearer end of what is long; None where it may be chance."""
     last = track[-1]
-    if last.size_m[0] - 1.0 <= LONG_M and last.is_whole:
+    if last.is_whole and max(each.size_m[0] for each in track) <= LONG_M:
         return estimate_velocity([each for each in track if each.is_whole], config.fit_s)
     east_m, north_m = last.outline[0] - newest.x_m, last.outline[1] - newest.y_m
     distance_m = np.hypot(east_m, north_m)
