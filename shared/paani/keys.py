@@ -388,17 +388,6 @@ def every_topic(graph: Graph | None = None) -> tuple[Topic[Any], ...]:
 # Ends the vessel's name of a recording that is played again, so that every key says so.
 REPLAY_SUFFIX = "_replay"
 
-# Earlier names of topics, and their present ones: old recordings still replay.
-RENAMED_TOPICS = {"plant/gps": GPS.name, "plant/imu": IMU.name}
-
-
-def present_name(name: str) -> str:
-    """The present name of a topic, or of a channel below it, that may carry an earlier one."""
-    for earlier, present in RENAMED_TOPICS.items():
-        if name == earlier or name.startswith(f"{earlier}/"):
-            return present + name.removeprefix(earlier)
-    return name
-
 
 def alive_name(service: str) -> str:
     """Liveliness token of one process, below the vessel's prefix; the verbatim chunk keeps it out of `**`."""

@@ -79,7 +79,8 @@ NAMES = """async ([places, next, ghost]) => {
   ctx.fillText = (text, x, y) => words.push([text, x, y, ctx.measureText(text).width, ctx.fillStyle]);
   const chart = { ctx, toScreen: (x, y) => [10 * x, 10 * y], pxPerM: 10, turnRad: 0, colour, labels };
   const still = { radius_m: 1, east_mps: 0, north_mps: 0, cpa_m: 2, tcpa_s: 9 };
-  const obstacles = places.map(([x_m, y_m, mmsi], index) => ({ ...still, x_m, y_m, mmsi, track_id: index + 1 }));
+  const obstacles = places.map(([x_m, y_m, mmsi, is_scanned], index) =>
+    ({ ...still, x_m, y_m, mmsi, is_scanned, track_id: index + 1 }));
   const tracks = obstacles.map(({ track_id: id }) => ({ id, label: "buoy" }));
   drawObstacles(chart, obstacles, { x_m: 0, y_m: 0, yaw_rad: 0, surge_mps: 0 }, 0, tracks);
   if (next) drawRoute(chart, { waypoints: [{ x_m: next[0], y_m: next[1] }] }, 0, 1);
@@ -209,11 +210,11 @@ async def test_the_map_shows_what_the_boat_is_told_and_what_comes(
 
 
 async def test_the_names_of_obstacles_beside_each_other_lie_on_none_of_the_others(scripts_page: Any) -> None:
-    places = [[20.0, 10.0], [20.4, 10.2], [20.1, 10.1], [60.0, 10.0], [90.0, 10.0, 235000001]]
+    places = [[20.0, 10.0], [20.4, 10.2], [20.1, 10.1], [60.0, 10.0], [90.0, 10.0, 235000001], [120.0, 10.0, 0, True]]
     words = await scripts_page.evaluate(NAMES, [places, None, None])
     assert sorted(text for text, *_ in words if "#" in text) == ["buoy #1", "buoy #2", "buoy #3", "buoy #4"]
-    assert len(words) == 10, "each with how near it comes"
-    assert "AIS 235000001" in {text for text, *_ in words}
+    assert len(words) == 12, "each with how near it comes"
+    assert {"AIS 235000001", "lidar"} < {text for text, *_ in words}
     assert overlaps(words) == []
     assert ("buoy #4", 104.0) in [(text, y) for text, _, y, *_ in words], "what stands alone keeps its place"
 

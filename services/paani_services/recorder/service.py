@@ -18,6 +18,7 @@ from paani.errors import UserError
 from paani.logs.folder import require_folder
 from paani.logs.repair import repair_all
 from paani.logs.writer import read_head
+from paani.topic_names import present_name
 from paani_services.recorder.backlog import Backlog, QueuedMessage
 from paani_services.recorder.recording import MIB, Recording, remove_empty_files
 from paani_services.recorder.system_description import describe_system
@@ -35,7 +36,7 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
         raise UserError("recorder.folder: not set (`paani up --record DIR` sets it)")
     await asyncio.to_thread(require_folder, folder)
     await asyncio.to_thread(remove_empty_files, folder)
-    left_out = {keys.present_name(name) for name in settings.leave_out}
+    left_out = {present_name(name) for name in settings.leave_out}
     topics = [topic for topic in keys.every_topic(config.bus.graph) if topic.name not in left_out]
     recording = Recording(settings, await asyncio.to_thread(describe_system, config), topics)
     backlog = Backlog(settings.queue_messages, round(settings.queue_mib * MIB))

@@ -23,6 +23,7 @@ from paani.config import Config, encode_config
 from paani.errors import UserError
 from paani.logs.pictures import RecordedPicture, paired_pictures
 from paani.logs.reader import Log, Record
+from paani.topic_names import present_name
 from paani.undecodable import UNDECODABLE
 from paani_tools.replay.shift import TimeShift
 
@@ -69,7 +70,7 @@ def topics_of(log: Log, what: RepublishOptions, graph: keys.Graph) -> list[keys.
     for service in keys.services_in(graph):
         known |= {topic.name: topic for topic in (keys.pulse(service), keys.health(service))}
     recorded = {name for name in log.topics if name in known}
-    chosen = recorded if what.only is None else {keys.present_name(name) for name in what.only}
+    chosen = recorded if what.only is None else {present_name(name) for name in what.only}
     for name in sorted(chosen - recorded):
         raise UserError(f"--only {name}: not in {log.path}")
     if not what.commands:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from paani.config.section import NonNegative, Positive, Section, Size
-from paani.keys import every_topic, present_name
+from paani.keys import every_topic
+from paani.topic_names import present_name
 
 KNOWN_TOPICS = frozenset(topic.name for topic in every_topic())
 

@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 from paani.config import Config, decode_config
 from paani.errors import UserError
-from paani.keys import present_name
 from paani.logs.layout import FORMAT, PROFILE, Layout, Span, messages_in, span_bytes
 from paani.logs.locate import layout_of
+from paani.topic_names import present_name
 
 SUFFIX = ".mcap"
 CONFIG_FILE = "config.json"

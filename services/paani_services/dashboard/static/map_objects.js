@@ -179,7 +179,8 @@ export function drawObstacles(chart, obstacles, pose, ageS, tracks) {
     ctx.moveTo(x, y);
     ctx.lineTo(...toScreen(east + obstacle.east_mps * ARROW_S, north + obstacle.north_mps * ARROW_S));
     ctx.stroke();
-    const name = obstacle.mmsi ? `AIS ${obstacle.mmsi}` : trackNames(tracks, [obstacle.track_id]);
+    const unseen = obstacle.mmsi ? `AIS ${obstacle.mmsi}` : obstacle.is_scanned ? "lidar" : "";
+    const name = unseen || trackNames(tracks, [obstacle.track_id]);
     const lines = [name, closestText(obstacle, ageS)].filter(Boolean);
     labels.add(lines, x + radius + 4, y + 4, "--text");
   }

@@ -65,9 +65,15 @@ def describe_encounter(encounter: Encounter, boat: BoatState, order: NavCommand)
     if encounter.kind is EncounterClass.NONE:
         return ""
     obstacle = encounter.obstacle
-    number = f" #{obstacle.track_id}" if obstacle.track_id else f" {obstacle.mmsi} (AIS)" if obstacle.mmsi else ""
     action = _describe_action(encounter, boat, order)
-    return f"Give way: {obstacle.label.value}{number} {MEETINGS[encounter.kind]}, {action}"
+    return f"Give way: {_name(obstacle)} {MEETINGS[encounter.kind]}, {action}"
+
+
+def _name(obstacle: DynamicObstacle) -> str:
+    if obstacle.is_scanned:
+        return "something (lidar)"
+    number = f" #{obstacle.track_id}" if obstacle.track_id else f" {obstacle.mmsi} (AIS)" if obstacle.mmsi else ""
+    return f"{obstacle.label.value}{number}"
 
 
 def _describe_action(encounter: Encounter, boat: BoatState, order: NavCommand) -> str:

@@ -155,8 +155,8 @@ def _estimate_velocity(track: list[PositionMeasurement], newest: Scan, config: P
     east_m, north_m = last.outline[0] - newest.x_m, last.outline[1] - newest.y_m
     distance_m = np.hypot(east_m, north_m)
     nearer = int(distance_m[-1] < distance_m[0])
-    shown = measurements_of_end(track, nearer)
-    return estimate_velocity(shown, config.fit_s) if shown and shown[-1].stamp_us == newest.stamp_us else None
+    of_end = measurements_of_end(track, nearer)
+    return estimate_velocity(of_end, config.fit_s) if of_end and of_end[-1].stamp_us == newest.stamp_us else None
 
 
 def _predict(outline: tuple[F64, F64], velocity: Velocity, age_us: int, config: PlannerConfig) -> DynamicObstacle:

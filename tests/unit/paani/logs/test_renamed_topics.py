@@ -12,6 +12,7 @@ from paani import messages as m
 from paani.config import load_config
 from paani.logs.reader import open_log
 from paani.logs.writer import LogWriter
+from paani.topic_names import present_name
 from paani_tools.logs.info import info_of
 from paani_tools.replay.republish import RepublishOptions, topics_of
 from tests.unit.paani.logs.small_logs import NAME, START_US, about, put
@@ -49,5 +50,5 @@ def test_an_earlier_recording_is_republished_under_present_names(earlier: Path) 
 
 def test_what_was_left_out_by_its_earlier_name_is_still_known() -> None:
     assert load_config(sets=['recorder.leave_out=["plant/imu"]']).recorder.leave_out == ("plant/imu",)
-    assert keys.present_name("plant/imu") == "sensors/imu"
-    assert keys.present_name("plant/imu_raw") == "plant/imu_raw"
+    assert present_name("plant/imu") == "sensors/imu"
+    assert present_name("plant/imu_raw") == "plant/imu_raw"

@@ -18,7 +18,16 @@ from paani_services.navigator.mapping.scanned_obstacles import ScannedWater, sca
 from paani_services.navigator.mapping.water_map import map_water
 from paani_sim.eye.camera import BoatPose
 from tests.synthetic_scans import MAX_RANGE_M, SCAN_US, scan_from
-from tests.synthetic_water import AT_REST, CAMERA, PLANNER, START_US, Bar, distance_to_bar_m, observe_from
+from tests.synthetic_water import (
+    AT_REST,
+    CAMERA,
+    PLANNER,
+    START_US,
+    Bar,
+    distance_to_bar_m,
+    observe_from,
+    water_edge_of,
+)
 
 SCANS = 14
 BANKS = ((-60.0, 6.0, 60.0, 7.0), (-60.0, -5.0, 60.0, -4.0))
@@ -128,13 +137,10 @@ def test_what_stands_is_occupied_where_no_camera_looks() -> None:
 @pytest.mark.slow
 def test_a_scan_only_ever_adds(places: list[tuple[float, float]], speed_mps: float) -> None:
     """Whatever it shows: what the camera saw occupied stays so, no water becomes free, no moving obstacle goes."""
-    seen = (4.0, -1.0, 4.6, 1.0)
     bars = tuple((x_m, y_m, x_m + 0.8, y_m + 0.8) for x_m, y_m in places if math.hypot(x_m, y_m) > 1.5)
     memory, now_us = scanned((6.0, 2.0, 8.0, 4.0), (speed_mps, 0.0), standing=bars)
-    memory = observe_from(edge=None, memory=memory, at_us=now_us) if not bars else memory
-    memory = observe_from(memory=memory, at_us=now_us + 100_000)
-    del seen
-    now_us += 100_000
+    edge = water_edge_of(AT_REST, ((4.0, -1.0, 4.6, 1.0),))
+    memory = observe_from(edge=edge, memory=memory, at_us=now_us)
     without, seen_alone = map_water(memory.observations, (0.0, 0.0), now_us, CAMERA, PLANNER)
     grid, obstacles = map_water(memory.observations, (0.0, 0.0), now_us, CAMERA, PLANNER, memory.scans)
     assert not (without.occupied & ~grid.occupied).any()
@@ -165,7 +171,6 @@ def test_one_beam_is_an_obstacle_and_has_no_velocity() -> None:
 
 
 def test_the_boats_own_motion_is_no_obstacles() -> None:
-    """A pile that stands, seen by a boat that turns and goes."""
+    """A pile that stands, met by a boat that turns and goes."""
     memory, now_us = scanned(None, boat_mps=0.6, yaw_rate_radps=0.3, standing=((4.0, 1.0, 4.6, 1.6),))
     assert water_of(memory, now_us).obstacles == ()
-    assert BoatPose(0.0, 0.0, 0.0) == AT_REST
