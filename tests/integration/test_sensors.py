@@ -23,7 +23,7 @@ from tests.at_work import at_work
 from tests.conftest import OpenAs, Spawn
 from tests.paani_command import paani
 from tests.places import DATA
-from tests.unit.paani_services.sensors.written import imu_line, nav_pvt, rmc, sentence
+from tests.unit.paani_services.sensors.written import imu_line, lidar_turn, nav_pvt, rmc, sentence
 
 pytestmark = pytest.mark.integration
 LOGS = DATA / "logs"
@@ -289,20 +289,20 @@ async def test_paani_sensors_shows_what_each_says_and_what_is_missing(
         await device(bus, SensorRole.IMU, lambda each: each.rate_hz > 90.0, 10.0)
         code, out, errors = await paani(private_sets, "sensors", "--for", "2.5")
         assert (code, errors) == (1, "")
-        gps, imu, heading, ais, lacks = out.split("\n\n")[1].splitlines()
+        gps, imu, heading, ais, lidar, lacks = out.split("\n\n")[1].splitlines()
         assert gps.startswith("gps     ok")
         assert "48.11" in gps
         assert "m/s^2" in imu
         assert heading.startswith("heading absent")
         assert "next try" in heading
-        assert ais.split()[:2] == ["ais", "off"], "a boat without one lacks nothing"
+        assert [each.split()[:2] for each in (ais, lidar)] == [["ais", "off"], ["lidar", "off"]], "it lacks nothing"
         assert lacks == "missing: a heading: the boat stays stopped without one"
         terminals["heading"].plug()
         await device(bus, SensorRole.HEADING, has(SensorStatus.OK), 10.0)
         code, out, errors = await paani(private_sets, "sensors", "--for", "2.5", "--json")
         assert (code, errors) == (0, "")
         row = msgspec.json.decode(out.splitlines()[-1])
-        assert [each["status"] for each in row["devices"]] == ["ok", "ok", "ok", "off"]
+        assert [each["status"] for each in row["devices"]] == ["ok", "ok", "ok", "off", "off"]
         assert row["missing"] == ""
         assert row["imu"]["orientation_available"]
 
@@ -340,3 +340,24 @@ async def test_vessels_that_speak_on_a_serial_line_reach_the_bus(spawn: Spawn, o
         received = ais.received
         await asyncio.sleep(2.5)
         assert ais.received == received
+
+
+async def test_the_turns_of_a_scanner_on_a_serial_line_reach_the_bus(
+    spawn: Spawn, open_as: OpenAs, tmp_path: Path
+) -> None:
+    """What is 2 m to starboard is 90 degrees clockwise for the scanner, and at -90 degrees on the bus."""
+    bus, scanner, noise = await open_as("observer"), Terminal(tmp_path / "lidar"), random.Random(1)
+    scanner.plug()
+    scans = bus.latest(keys.SCAN)
+    async with spawn("sensors", f'sensors.lidar.line="{scanner.address}"'):
+        async with asyncio.timeout(15.0):
+            while scans.value is None:
+                turn = lidar_turn(lambda deg: 2.0 + noise.uniform(0.0, 0.02) if abs(deg - 90.0) < 5.0 else 0.0)
+                scanner.write(turn)
+                await asyncio.sleep(0.1)
+        scan = scans.value
+        seen_deg = [math.degrees(scan.first_bearing_rad + k * scan.step_rad) for k, r in enumerate(scan.ranges_m) if r]
+        assert (min(seen_deg), max(seen_deg)) == pytest.approx((-94.5, -85.5), abs=1.5)
+        await device(bus, SensorRole.LIDAR, has(SensorStatus.OK), 5.0)
+        scanner.unplug()
+        await device(bus, SensorRole.LIDAR, has(SensorStatus.ABSENT), 12.0)

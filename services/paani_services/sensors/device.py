@@ -8,10 +8,22 @@ from paani.messages import SensorDevice, SensorRole, SensorStatus
 RATE_WINDOW_S = 5.0  # over which the rate of data is counted
 SHORTEST_SPAN_S = 0.5  # data that come in one piece show no rate
 # Without a byte: every device speaks once a second at least, but a receiver that no vessel is near.
-SILENT_S = {SensorRole.GPS: 2.0, SensorRole.IMU: 2.0, SensorRole.HEADING: 2.0, SensorRole.AIS: math.inf}
+SILENT_S = {
+    SensorRole.GPS: 2.0,
+    SensorRole.IMU: 2.0,
+    SensorRole.HEADING: 2.0,
+    SensorRole.AIS: math.inf,
+    SensorRole.LIDAR: 2.0,
+}
 UNREADABLE_S = 2.0  # with bytes, and without an intact frame
 # Without usable data; the estimate gives up no later (`LocalizationConfig.max_gps_age_s` and its kind).
-LATE_S = {SensorRole.GPS: 3.0, SensorRole.IMU: 0.5, SensorRole.HEADING: 3.0, SensorRole.AIS: math.inf}
+LATE_S = {
+    SensorRole.GPS: 3.0,
+    SensorRole.IMU: 0.5,
+    SensorRole.HEADING: 3.0,
+    SensorRole.AIS: math.inf,
+    SensorRole.LIDAR: 1.0,
+}
 NEVER_AGE_S = 1e6  # of data that never came, as in the health reports
 KINDS_SHOWN = 12
 NEEDED = {
@@ -19,6 +31,7 @@ NEEDED = {
     SensorRole.IMU: "no sample (PQTMIMU or VNYMR)",
     SensorRole.HEADING: "no heading (HDT, THS, HDG or HDM)",
     SensorRole.AIS: "no position report (VDM)",
+    SensorRole.LIDAR: "no whole turn: does it turn freely?",
 }
 
 
@@ -101,7 +114,8 @@ class Device:
         if unread_s > UNREADABLE_S:
             if line.foreign:
                 return SensorStatus.UNREADABLE, f"speaks {line.foreign}, which sensors.gps.protocol leaves out"
-            return SensorStatus.UNREADABLE, "bytes that are neither NMEA nor UBX: another baud rate or protocol?"
+            wanted = "no LDROBOT packets" if self.role is SensorRole.LIDAR else "neither NMEA nor UBX"
+            return SensorStatus.UNREADABLE, f"bytes that are {wanted}: another baud rate or protocol?"
         if self.frozen_cause:
             return SensorStatus.FROZEN, self.frozen_cause
         if self.implausible_cause:

@@ -1,7 +1,8 @@
 """Whether a sensor is frozen: it goes on talking, and says the same. Told from a sensor that rests. Pure.
 
 A receiver at rest may repeat its position, but its time goes on and its speed is about zero. A sample of an inertial
-unit at rest has noise in its last digits. A compass at rest may repeat its heading, but then the gyro does not turn.
+unit at rest has noise in its last digits, and so has each echo of a range scanner. A compass at rest may repeat its
+heading, but then the gyro does not turn.
 """
 
 import math
@@ -95,3 +96,17 @@ class GravityWatch:
         self._n = min(self._n + 1, GRAVITY_SAMPLES)
         self._mean_mps2 += (math.hypot(*sample.accel_mps2) - self._mean_mps2) / self._n
         return not LEAST_GRAVITY_MPS2 <= self._mean_mps2 <= MOST_GRAVITY_MPS2
+
+
+class TurnWatch:
+    """Finds a range scanner whose turns are all the same to the last millimetre, and show something."""
+
+    def __init__(self) -> None:
+        self._last: tuple[float, ...] = ()
+        self._same_n = 0
+
+    def take(self, ranges_m: tuple[float, ...]) -> bool:
+        """Whether the scanner is frozen, by this turn and those before it."""
+        self._same_n = self._same_n + 1 if ranges_m == self._last and any(ranges_m) else 0
+        self._last = ranges_m
+        return self._same_n >= REPEATED_TIMES

@@ -1,4 +1,4 @@
-"""Sensor process: GPS, IMU, heading and AIS devices of a real hull in, fixes, samples and vessels out."""
+"""Sensor process: GPS, IMU, heading, AIS and lidar devices of a real hull in, fixes, samples, vessels and scans out."""
 
 import asyncio
 from collections import Counter
@@ -25,13 +25,15 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     suite = SensorSuite(config.sensors)
     step = ClockStep(clock, MonotonicClock())
     gps, imu, state = bus.publisher(keys.GPS), bus.publisher(keys.IMU), bus.publisher(keys.SENSORS_STATE)
-    ais = bus.publisher(keys.AIS)
+    ais, scan = bus.publisher(keys.AIS), bus.publisher(keys.SCAN)
 
     def publish(reading: Reading) -> None:
         for fix in reading.fixes:
             gps.put(fix)
         for sample in reading.samples:
             imu.put(sample)
+        for turn in reading.scans:
+            scan.put(turn)
 
     with bus.alive():
         async with asyncio.TaskGroup() as group:

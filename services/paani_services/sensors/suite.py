@@ -10,20 +10,29 @@ from typing import NamedTuple
 import msgspec
 
 from paani.config import SensorDevicesConfig
-from paani.messages import AisVessel, GpsFix, ImuSample, SensorDevice, SensorRole
+from paani.messages import AisVessel, GpsFix, ImuSample, RangeScan, SensorDevice, SensorRole
 from paani_services.sensors.ais_reports import SENTENCE, AisReports
 from paani_services.sensors.device import Device, Line
 from paani_services.sensors.fixes import FixDecoder
 from paani_services.sensors.framing import Frame, Framer, Protocol
-from paani_services.sensors.freezing import REPEATED_TIMES, GravityWatch, HeadingWatch, PositionWatch, SampleWatch
+from paani_services.sensors.freezing import (
+    REPEATED_TIMES,
+    GravityWatch,
+    HeadingWatch,
+    PositionWatch,
+    SampleWatch,
+    TurnWatch,
+)
 from paani_services.sensors.heading import YawKeeper, read_heading, true_yaw_rad
 from paani_services.sensors.inertial import InertialSample, Mounting, imu_message, read_sample
+from paani_services.sensors.lidar_packets import TurnAssembler, scan_message
 from paani_services.sensors.receipt_clock import ReceiptClock
 from paani_services.sensors.sentences import ChecksumError, Sentence, read_sentence
 
 FIX_SENTENCES = frozenset({"RMC", "GGA", "GLL", "VTG", "GST"})
 HEADING_SENTENCES = frozenset({"HDT", "THS", "HDG", "HDM"})
 SAMPLE_SENTENCES = frozenset({"PQTMIMU", "VNYMR"})
+PACKET = "LDROBOT"
 MAX_KINDS, MAX_KIND = 64, 12  # kinds of frames remembered, and characters of one: a line may say anything
 NO_GRAVITY = "its acceleration is not that of gravity: does it write m/s^2? Its data are withheld"
 LATE = "its data come over a second late: they are withheld"
@@ -35,6 +44,7 @@ class Reading(NamedTuple):
 
     fixes: tuple[GpsFix, ...] = ()
     samples: tuple[ImuSample, ...] = ()
+    scans: tuple[RangeScan, ...] = ()
 
 
 class SensorSuite:
@@ -47,6 +57,7 @@ class SensorSuite:
         named = {SensorRole(role): line for role, line in config.lines.items()}
         self._lines = {address: Line(address) for address in named.values() if address}
         self._framers = {address: Framer() for address in self._lines}
+        self._turns, self._turn_watch = TurnAssembler(config.lidar), TurnWatch()
         self._devices = {role: Device(role, self._lines.get(address)) for role, address in named.items()}
         self._fixes, self._position_watch = FixDecoder(self.drops), PositionWatch()
         self._fix_clock, self._fix_us = ReceiptClock(), 0
@@ -74,6 +85,8 @@ class SensorSuite:
                     self._fix_clock = ReceiptClock()
                 case SensorRole.IMU:
                     self._sample_watch, self._gravity_watch = SampleWatch(), GravityWatch()
+                case SensorRole.LIDAR:
+                    self._turns, self._turn_watch = TurnAssembler(self._config.lidar), TurnWatch()
                 case SensorRole.HEADING:
                     self._heading_watch = HeadingWatch()
                     self._yaw.forget()
@@ -94,6 +107,9 @@ class SensorSuite:
         line, framer = self._lines[address], self._framers[address]
         line.bytes += len(data)
         line.last_byte_us = now_us
+        lidar = self._devices[SensorRole.LIDAR]
+        if lidar.line is line:
+            return self._take_turns(lidar, line, data, now_us)
         before = framer.cut_sentences, framer.ubx_failures
         fixes, samples = list[GpsFix](), list[InertialSample]()
         for frame in framer.feed(data):
@@ -110,6 +126,26 @@ class SensorSuite:
         self.drops += Counter(nmea_damaged=cut, ubx_checksum=failed)
         return Reading(tuple(fixes), self._stamped(samples, now_us))
 
+    def _take_turns(self, device: Device, line: Line, data: bytes, now_us: int) -> Reading:
+        """The scans that the bytes of the range scanner's own line complete."""
+        packets, failures = self._turns.packets, self._turns.checksum_failures
+        turns = self._turns.feed(data)
+        for _ in range(self._turns.packets - packets):
+            _count_frame(line, PACKET, now_us)
+        line.checksum_failures += self._turns.checksum_failures - failures
+        self.drops += Counter(lidar_checksum=self._turns.checksum_failures - failures)
+        scans = []
+        for turn in turns:
+            is_frozen = self._turn_watch.take(turn.ranges_m)
+            device.frozen_cause = "the scanner repeats one turn: its data are withheld" if is_frozen else ""
+            if is_frozen:
+                device.withheld += 1
+                self.drops["lidar_frozen"] += 1
+            else:
+                device.count_data(now_us)
+                scans.append(scan_message(turn, self._config.lidar, now_us))
+        return Reading(scans=tuple(scans))
+
     def vessels(self, now_us: int) -> tuple[AisVessel, ...] | None:
         """Those that the AIS receiver has heard; None while there is no receiver."""
         line = self._devices[SensorRole.AIS].line
@@ -125,7 +161,8 @@ class SensorSuite:
     def _take_frame(
         self, line: Line, frame: Frame, now_us: int, fixes: list[GpsFix], samples: list[InertialSample]
     ) -> None:
-        gps, imu, heading, ais = (self._devices[role] for role in SensorRole)
+        roles = (SensorRole.GPS, SensorRole.IMU, SensorRole.HEADING, SensorRole.AIS)
+        gps, imu, heading, ais = (self._devices[role] for role in roles)
         is_gps = gps.line is line
         protocol = self._config.gps.protocol if is_gps else "auto"
         if protocol not in {"auto", frame.protocol.lower()}:

@@ -1,4 +1,4 @@
-"""Devices of a real hull: GPS, IMU, heading and AIS, each on a line of its own or several on one."""
+"""Devices of a real hull: GPS, IMU, heading, AIS and lidar, each on a line of its own or several on one."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from paani.config.section import NonNegative, Positive, Section
+from paani.config.section import NonNegative, Offset, Positive, Section
 from paani.port_address import parse_address
 
 Degrees = Annotated[float, msgspec.Meta(ge=-180.0, le=180.0)]
@@ -53,6 +53,16 @@ class AisConfig(Section, frozen=True):
     own_mmsi: Annotated[int, msgspec.Meta(ge=0, le=999_999_999)] = 0  # of a transponder on the boat itself; 0: none
 
 
+class LidarConfig(Section, frozen=True):
+    """A planar range scanner, above whatever stands on deck. It adds obstacles all round; the camera's stay."""
+
+    line: str = ""  # none unless one is named; `serial:/dev/ttyUSB0@230400` of an LD06 or LD19, @921600 of an STL-27L
+    offset_deg: Degrees = 0.0  # direction of the mark on its case, clockwise from ahead
+    forward_m: Offset = 0.0  # ahead of the boat's middle
+    near_m: NonNegative = 0.6  # nearer echoes are the boat's own: mast, aerials, half the beam
+    max_range_m: Annotated[float, msgspec.Meta(ge=1.0, le=100.0)] = 12.0  # of an LD06 or LD19
+
+
 class SensorDevicesConfig(Section, frozen=True):
     """What is on the boat's lines. Nothing is published for a device that is not set."""
 
@@ -60,6 +70,7 @@ class SensorDevicesConfig(Section, frozen=True):
     imu: ImuConfig = ImuConfig()
     heading: HeadingConfig = HeadingConfig()
     ais: AisConfig = AisConfig()
+    lidar: LidarConfig = LidarConfig()
     # East positive; makes magnetic headings true. Unset: only headings that bring their own variation are used,
     # because a wrong one turns the boat.
     variation_deg: Degrees | None = None
@@ -67,7 +78,8 @@ class SensorDevicesConfig(Section, frozen=True):
     @property
     def lines(self) -> Mapping[str, str]:
         """The line of each device by its role, "" where none is named."""
-        return {"gps": self.gps.line, "imu": self.imu.line, "heading": self.heading.line, "ais": self.ais.line}
+        devices = (("gps", self.gps), ("imu", self.imu), ("heading", self.heading), ("ais", self.ais))
+        return {role: device.line for role, device in (*devices, ("lidar", self.lidar))}
 
     def __post_init__(self) -> None:
         """Every line is one that can be opened."""
@@ -76,6 +88,9 @@ class SensorDevicesConfig(Section, frozen=True):
                 require_line(line)
             except ValueError as error:
                 raise ValueError(f"{name}.line: {error}") from error
+        for name, line in self.lines.items():
+            if line and name != "lidar" and line.partition("@")[0] == self.lidar.line.partition("@")[0]:
+                raise ValueError(f"lidar.line: is also {name}.line; a range scanner shares its line with nothing")
 
 
 def require_line(line: str) -> None:

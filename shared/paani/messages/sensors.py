@@ -16,6 +16,7 @@ class SensorRole(StrEnum):
     IMU = "imu"
     HEADING = "heading"
     AIS = "ais"
+    LIDAR = "lidar"
 
 
 class SensorStatus(StrEnum):

@@ -10,14 +10,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from paani.config import AisConfig, GpsConfig, HeadingConfig, ImuConfig, SensorDevicesConfig
+from paani.config import AisConfig, GpsConfig, HeadingConfig, ImuConfig, LidarConfig, SensorDevicesConfig
 from paani.messages import GpsFix, ImuSample, SensorDevice, SensorRole, SensorStatus
 from paani_services.sensors.fixes import RESYNC_FIXES
 from paani_services.sensors.suite import SensorSuite
 from tests.unit.paani_services.sensors.written import imu_line, nav_pvt, rmc, sentence
 
 GPS, IMU, HEADING = "serial:/dev/gps@9600", "serial:/dev/imu", "serial:/dev/compass@4800"
-RECEIVER = "serial:/dev/ais@38400"
+RECEIVER, SCANNER = "serial:/dev/ais@38400", "serial:/dev/lidar@230400"
+LINES = [GPS, IMU, HEADING, RECEIVER, SCANNER]
 CONFIG = SensorDevicesConfig(
     gps=GpsConfig(line=GPS), imu=ImuConfig(line=IMU), heading=HeadingConfig(line=HEADING), variation_deg=2.0
 )
@@ -349,13 +350,13 @@ def test_the_rate_is_that_of_usable_data() -> None:
 
 
 @settings(deadline=None)  # the first example compiles patterns and fills caches
-@given(st.lists(st.tuples(st.sampled_from([GPS, IMU, HEADING, RECEIVER]), st.binary(max_size=300)), max_size=8))
+@given(st.lists(st.tuples(st.sampled_from(LINES), st.binary(max_size=300)), max_size=8))
 def test_any_bytes_on_any_line_are_survived(pieces: list[tuple[str, bytes]]) -> None:
-    bench = Bench(msgspec.structs.replace(CONFIG, ais=AisConfig(line=RECEIVER)))
+    bench = Bench(msgspec.structs.replace(CONFIG, ais=AisConfig(line=RECEIVER), lidar=LidarConfig(line=SCANNER)))
     for address, data in pieces:
         bench.wait(0.1)
         bench.suite.take(address, data, bench.now_us)
-    assert len(bench.suite.report(bench.now_us)) == 4
+    assert len(bench.suite.report(bench.now_us)) == 5
 
 
 BODIES = st.text(st.characters(codec="ascii", exclude_characters="\r\n$!*"), max_size=80)

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Callable
 from functools import reduce
+
+from paani_services.sensors.lidar_packets import HEADER, LAYOUT, checksum
 
 
 def sentence(body: str) -> str:
@@ -52,3 +55,17 @@ def nav_pvt(
     )  # fmt: skip
     assert len(payload) == 92
     return ubx(b"\x01\x07", payload)
+
+
+def lidar_turn(range_m: Callable[[float], float], speed_dps: int = 3600, begins_deg: float = 0.0) -> bytes:
+    """One turn of an LD19: packets of 12 points 0.8 degrees apart, whose ranges are those of their clockwise angle."""
+    data = b""
+    for packet in range(38):
+        angles = [begins_deg + 0.8 * (12 * packet + point) for point in range(12)]
+        points = [(round(1000.0 * range_m(each % 360.0)), 200) for each in angles if each < begins_deg + 360.0]
+        if len(points) == 12:
+            ends = [round(100.0 * (each % 360.0)) for each in (angles[0], angles[-1])]
+            fields = [value for point in points for value in point]
+            body = LAYOUT.pack(HEADER, speed_dps, ends[0], *fields, ends[1], 0, 0)[:-1]
+            data += body + bytes([checksum(body)])
+    return data
