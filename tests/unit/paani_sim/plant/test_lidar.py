@@ -68,6 +68,7 @@ def test_what_is_out_of_range_or_lower_than_the_beams_is_not_met(
 ) -> None:
     """As a swimmer is: a scanner never stands in for the camera."""
     assert not any(afloat(wall(x_m, height_m)).read_lidar())
+    assert any(afloat(wall(6.0, HEIGHT_M + 0.05)).read_lidar())
 
 
 def test_errors_are_as_large_as_stated_and_new_in_each_turn(afloat: OpenPlant) -> None:

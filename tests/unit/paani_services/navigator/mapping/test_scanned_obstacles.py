@@ -118,9 +118,9 @@ def is_occupied(grid: OccupancyGrid, bar: Bar) -> bool:
     return any(distance_to_bar_m(x_m, y_m, bar) < CELL_M for x_m, y_m in middles)
 
 
-def test_what_stands_is_occupied_where_no_camera_looks() -> None:
-    """Astern, abeam, and in the blind zone, which counts as water without it."""
-    bars = ((-4.0, -0.5, -3.0, 0.5), (-0.5, 1.4, 0.5, 2.0))
+def test_what_stands_is_occupied_where_the_camera_does_not_see_it() -> None:
+    """Astern, abeam, in the blind zone, which counts as water without it, and where the camera took it for water."""
+    bars = ((-4.0, -0.5, -3.0, 0.5), (-0.5, 1.4, 0.5, 2.0), (4.0, -0.5, 4.6, 0.5))
     memory, now_us = scanned(None, standing=bars)
     memory = observe_from(memory=memory, at_us=now_us)
     without, _ = map_water(memory.observations, (0.0, 0.0), now_us, CAMERA, PLANNER)
