@@ -182,6 +182,10 @@ SCAN = Topic(
     name="sensors/scan", type=m.RangeScan, producer="plant", rate_hz=5.0, fresh_s=1.0,
     stance=Stance.STATE, summary="ranges all round of a planar scanner, where the boat has one",
 )
+DEPTH = Topic(
+    name="sensors/depth", type=m.Depth, producer="plant", rate_hz=5.0, fresh_s=2.0,
+    stance=Stance.STATE, summary="depth of the water under the boat, by its echo sounder",
+)
 THRUST_APPLIED = Topic(
     name="plant/thrust_applied", type=m.ThrustApplied, producer="plant", rate_hz=20.0, fresh_s=0.5,
     stance=Stance.STATE, summary="what the thrust adapter applies, and why not",
@@ -256,7 +260,7 @@ ASKED: tuple[Topic[Any], ...] = (*REQUESTS.values(), *MISSION_REQUESTS.values(),
 TOPICS: tuple[Topic[Any], ...] = (
     PICTURE, RENDERED, MASK, EVIDENCE, TRACKS, ADVISORY, COMMAND, ROUTE, MISSION, PREDICTION, OCCUPANCY, THRUST,
     LOCAL_ODOMETRY, ODOMETRY, ARMING, OPERATOR_STATE, OPERATOR_ORDER, ORDERED_MISSION, TUNING, SHADOW, SIM_TIME, GPS,
-    IMU, AIS, SCAN, THRUST_APPLIED, THRUSTERS_STATE, TRUE_POSE, BRIDGE_STATE, SENSORS_STATE, RECORDER_STATE,
+    IMU, AIS, SCAN, DEPTH, THRUST_APPLIED, THRUSTERS_STATE, TRUE_POSE, BRIDGE_STATE, SENSORS_STATE, RECORDER_STATE,
     *ASKED, *STEPS.values(),
 )
 # fmt: on
@@ -273,30 +277,16 @@ PRODUCERS: Mapping[Graph, Mapping[str, str]] = {
         IMU.name: "sensors",
         AIS.name: "sensors",
         SCAN.name: "sensors",
+        DEPTH.name: "sensors",
         RENDERED.name: NOBODY,
         TRUE_POSE.name: NOBODY,
     },
 }
 
 SERVICES = (
-    "router",
-    "recorder",
-    "plant",
-    "eye",
-    "sensors",
-    "camera",
-    "perception",
-    "advisor",
-    "navigator",
-    "controller",
-    "localization",
-    "thrusters",
-    "bridge",
-    "operator",
-    BUTTON,
-    "dashboard",
-    *PORTS,
-)
+    "router", "recorder", "plant", "eye", "sensors", "camera", "perception", "advisor", "navigator", "controller",
+    "localization", "thrusters", "bridge", "operator", BUTTON, "dashboard", *PORTS,
+)  # fmt: skip
 # Who has no place in a graph: no credential there, and no rights. Only a simulated boat is armed without a hand.
 ABSENT: Mapping[Graph, frozenset[str]] = {
     Graph.SIMULATION: frozenset({"thrusters", "sensors"}),

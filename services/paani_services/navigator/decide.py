@@ -38,6 +38,7 @@ def decide(
         order_us=ordered.received_us,
         ais=inputs[keys.AIS.name].message,
         scan=inputs[keys.SCAN.name].message,
+        depth=inputs[keys.DEPTH.name].message,
     )
     camera = Camera(config.calibration, config.perception.ego_polygon)
     state, command = follow_order(
@@ -74,6 +75,7 @@ DECIDER = Decider(
         keys.OPERATOR_ORDER,
         keys.AIS,
         keys.SCAN,
+        keys.DEPTH,
     ),
     own=(keys.ROUTE, keys.MISSION),
     outputs=(keys.COMMAND,),

@@ -9,6 +9,7 @@ from paani.messages import (
     Advisory,
     AisVessels,
     Arming,
+    Depth,
     Direction,
     Evidence,
     Inhibit,
@@ -37,6 +38,7 @@ class NavigatorInputs(msgspec.Struct, frozen=True):
     order_us: int = 0
     ais: AisVessels | None = None
     scan: RangeScan | None = None
+    depth: Depth | None = None
 
 
 def is_out_of_date(stamp_us: int, limit_s: float, now_us: int, config: NavigatorConfig) -> bool:

@@ -195,7 +195,14 @@ def begin_step(
     state = _end_visual_turn(state, inputs)
     if config.planner.acts_on(camera.calibration):
         planner_state = observe(
-            state.planner_state, inputs.odometry, inputs.evidence, config.planner, inputs.tracks, inputs.scan
+            state.planner_state,
+            inputs.odometry,
+            inputs.evidence,
+            config.planner,
+            inputs.tracks,
+            inputs.scan,
+            inputs.depth,
+            now_us,
         )
         state = msgspec.structs.replace(state, planner_state=planner_state)
     return state, inhibits

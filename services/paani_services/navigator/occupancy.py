@@ -10,6 +10,7 @@ from paani.occupancy_cells import pack_cells
 from paani_services.navigator.avoidance.replanning import PlannerState
 from paani_services.navigator.mapping.observed_cells import CELL_M, Camera
 from paani_services.navigator.mapping.occupancy_grid import GRID_CELLS
+from paani_services.navigator.mapping.shallow_cells import apply_shallow_cells, cells_on_grid
 from paani_services.navigator.mapping.water_map import map_water
 
 
@@ -26,6 +27,7 @@ def occupancy_around(
     if odometry is None or not odometry.healthy:
         return None
     grid, _ = map_water(observations, (here.x_m, here.y_m), now_us, camera, config.planner, planner.memory.scans)
+    grid = apply_shallow_cells(grid, cells_on_grid(planner.soundings.cells, (here.x_m, here.y_m)))
     cells = np.full(grid.occupied.shape, m.Occupancy.UNKNOWN, np.uint8)
     cells[grid.free] = m.Occupancy.FREE
     cells[grid.blind_zone] = m.Occupancy.BLIND_ZONE

@@ -69,6 +69,8 @@ def predict(
         home=home,
         courtesy=courtesy,
         headings=headings,
+        soundings=state.planner_state.soundings.status,
+        depth_m=state.planner_state.soundings.depth_m,
     )
 
 

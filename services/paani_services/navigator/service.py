@@ -15,6 +15,7 @@ from paani.runtime import runtime_dir
 from paani_services.navigator.decide import DECIDER
 from paani_services.navigator.files.mission_file import load_route_and_mission, next_route
 from paani_services.navigator.mapping.observed_cells import Camera
+from paani_services.navigator.mapping.soundings import name_doubts
 from paani_services.navigator.mission_in_force import MissionInForce
 from paani_services.navigator.occupancy import occupancy_around
 from paani_services.navigator.predict import predict
@@ -61,7 +62,7 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
                     published, sent_us = stepper.conclude(outputs)[keys.COMMAND.name], now_us
                     assert isinstance(published, m.NavCommand)
                     sent = published
-                    bus.note(", ".join(order.inhibits))
+                    bus.note(", ".join([*order.inhibits, *name_doubts(stepper.state.planner_state.soundings)]))
                 else:
                     stepper.conclude({})
                 if has_passed(predicted_us, 1e6 / keys.PREDICTION.rate_hz, now_us):

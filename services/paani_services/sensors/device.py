@@ -14,6 +14,7 @@ SILENT_S = {
     SensorRole.HEADING: 2.0,
     SensorRole.AIS: math.inf,
     SensorRole.LIDAR: 2.0,
+    SensorRole.SONAR: 3.0,
 }
 UNREADABLE_S = 2.0  # with bytes, and without an intact frame
 # Without usable data; the estimate gives up no later (`LocalizationConfig.max_gps_age_s` and its kind).
@@ -23,6 +24,7 @@ LATE_S = {
     SensorRole.HEADING: 3.0,
     SensorRole.AIS: math.inf,
     SensorRole.LIDAR: 1.0,
+    SensorRole.SONAR: 3.0,
 }
 NEVER_AGE_S = 1e6  # of data that never came, as in the health reports
 KINDS_SHOWN = 12
@@ -32,6 +34,7 @@ NEEDED = {
     SensorRole.HEADING: "no heading (HDT, THS, HDG or HDM)",
     SensorRole.AIS: "no position report (VDM)",
     SensorRole.LIDAR: "no whole turn: does it turn freely?",
+    SensorRole.SONAR: "no sounding (DPT or DBT)",
 }
 
 

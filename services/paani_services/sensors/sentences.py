@@ -26,6 +26,7 @@ _LIBRARY_ERRORS = (
 # The sentences that are read, and the fields they must have at least.
 READ_SENTENCES = {
     "RMC": 8, "GGA": 8, "GLL": 6, "VTG": 5, "GST": 8,
+    "DPT": 1, "DBT": 4,
     "HDT": 1, "HDG": 5, "HDM": 1, "THS": 2,
     "PQTMIMU": 7, "VNYMR": 12,
 }  # fmt: skip

@@ -1,4 +1,4 @@
-"""Sensor process: GPS, IMU, heading, AIS and lidar devices of a real hull in, fixes, samples, vessels and scans out."""
+"""Sensor process: devices of a real hull in; fixes, samples, vessels, scans and soundings out."""
 
 import asyncio
 from collections import Counter
@@ -25,7 +25,7 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     suite = SensorSuite(config.sensors)
     step = ClockStep(clock, MonotonicClock())
     gps, imu, state = bus.publisher(keys.GPS), bus.publisher(keys.IMU), bus.publisher(keys.SENSORS_STATE)
-    ais, scan = bus.publisher(keys.AIS), bus.publisher(keys.SCAN)
+    ais, scan, depth = bus.publisher(keys.AIS), bus.publisher(keys.SCAN), bus.publisher(keys.DEPTH)
 
     def publish(reading: Reading) -> None:
         for fix in reading.fixes:
@@ -34,6 +34,8 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
             imu.put(sample)
         for turn in reading.scans:
             scan.put(turn)
+        for sounding in reading.depths:
+            depth.put(sounding)
 
     with bus.alive():
         async with asyncio.TaskGroup() as group:

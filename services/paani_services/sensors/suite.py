@@ -10,8 +10,9 @@ from typing import NamedTuple
 import msgspec
 
 from paani.config import SensorDevicesConfig
-from paani.messages import AisVessel, GpsFix, ImuSample, RangeScan, SensorDevice, SensorRole
+from paani.messages import AisVessel, Depth, GpsFix, ImuSample, RangeScan, SensorDevice, SensorRole
 from paani_services.sensors.ais_reports import SENTENCE, AisReports
+from paani_services.sensors.depth_sentences import DEPTH_SENTENCES, DepthDecoder
 from paani_services.sensors.device import Device, Line
 from paani_services.sensors.fixes import FixDecoder
 from paani_services.sensors.framing import Frame, Framer, Protocol
@@ -45,6 +46,7 @@ class Reading(NamedTuple):
     fixes: tuple[GpsFix, ...] = ()
     samples: tuple[ImuSample, ...] = ()
     scans: tuple[RangeScan, ...] = ()
+    depths: tuple[Depth, ...] = ()
 
 
 class SensorSuite:
@@ -67,6 +69,7 @@ class SensorSuite:
         self._sample_clock, self._device_ms = ReceiptClock(), 0
         self._heading_watch, self._yaw = HeadingWatch(), YawKeeper(config.heading.max_age_s)
         self._ais = AisReports(self.drops, config.ais.own_mmsi)
+        self._depths = DepthDecoder(self.drops, config.sonar.transducer_m)
 
     @property
     def lines(self) -> Mapping[str, Line]:
@@ -90,6 +93,8 @@ class SensorSuite:
                 case SensorRole.HEADING:
                     self._heading_watch = HeadingWatch()
                     self._yaw.forget()
+                case SensorRole.SONAR:
+                    self._depths = DepthDecoder(self.drops, self._config.sonar.transducer_m)
 
     def lost(self, address: str, problem: str) -> None:
         """A line cannot be opened, or is gone."""
@@ -100,6 +105,7 @@ class SensorSuite:
         self._fix_clock.shift(step_us)
         self._sample_clock.shift(step_us)
         self._ais.shift_clock(step_us)
+        self._depths.shift_clock(step_us)
         self._fix_us, self._sample_us = max(self._fix_us + step_us, 0), max(self._sample_us + step_us, 0)
 
     def take(self, address: str, data: bytes, now_us: int) -> Reading:
@@ -111,10 +117,10 @@ class SensorSuite:
         if lidar.line is line:
             return self._take_turns(lidar, line, data, now_us)
         before = framer.cut_sentences, framer.ubx_failures
-        fixes, samples = list[GpsFix](), list[InertialSample]()
+        fixes, samples, depths = list[GpsFix](), list[InertialSample](), list[Depth]()
         for frame in framer.feed(data):
             try:
-                self._take_frame(line, frame, now_us, fixes, samples)
+                self._take_frame(line, frame, now_us, fixes, samples, depths)
             except ChecksumError:
                 line.checksum_failures += 1
                 self.drops["nmea_checksum"] += 1
@@ -124,7 +130,7 @@ class SensorSuite:
         cut, failed = framer.cut_sentences - before[0], framer.ubx_failures - before[1]
         line.damaged, line.checksum_failures = line.damaged + cut, line.checksum_failures + failed
         self.drops += Counter(nmea_damaged=cut, ubx_checksum=failed)
-        return Reading(tuple(fixes), self._stamped(samples, now_us))
+        return Reading(tuple(fixes), self._stamped(samples, now_us), depths=tuple(depths))
 
     def _take_turns(self, device: Device, line: Line, data: bytes, now_us: int) -> Reading:
         """The scans that the bytes of the range scanner's own line complete."""
@@ -159,10 +165,16 @@ class SensorSuite:
         return [each for each in self._devices.values() if each.line is self._lines[address]]
 
     def _take_frame(
-        self, line: Line, frame: Frame, now_us: int, fixes: list[GpsFix], samples: list[InertialSample]
+        self,
+        line: Line,
+        frame: Frame,
+        now_us: int,
+        fixes: list[GpsFix],
+        samples: list[InertialSample],
+        depths: list[Depth],
     ) -> None:
-        roles = (SensorRole.GPS, SensorRole.IMU, SensorRole.HEADING, SensorRole.AIS)
-        gps, imu, heading, ais = (self._devices[role] for role in roles)
+        roles = (SensorRole.GPS, SensorRole.IMU, SensorRole.HEADING, SensorRole.AIS, SensorRole.SONAR)
+        gps, imu, heading, ais, sonar = (self._devices[role] for role in roles)
         is_gps = gps.line is line
         protocol = self._config.gps.protocol if is_gps else "auto"
         if protocol not in {"auto", frame.protocol.lower()}:
@@ -185,6 +197,11 @@ class SensorSuite:
             samples.append(self._mounting.turn(read_sample(sentence)))
         elif heading.line is line and kind in HEADING_SENTENCES:
             self._use_heading(heading, sentence, now_us)
+        elif sonar.line is line and kind in DEPTH_SENTENCES:
+            sounding = self._depths.take_sentence(sentence, now_us)
+            if sounding is not None:
+                sonar.count_data(now_us)
+                depths.append(sounding)
 
     def _use_fix(self, gps: Device, fix: GpsFix | None, now_us: int) -> list[GpsFix]:
         if fix is None:

@@ -19,6 +19,7 @@ from paani.messages import (
     LaneRisk,
     Limit,
     MotionState,
+    SoundingStatus,
     Track,
     ZeroCause,
 )
@@ -153,6 +154,7 @@ def _navigator(moment: Moment) -> list[str]:
         return ["no order on this advice in the log"]
     planned_for = [f"planned for {obstacles}"] if (obstacles := _planned_for(moment, order.obstacle_track_ids)) else []
     planned_for += _encounters(moment)
+    planned_for += _soundings(moment)
     planned_for += _headings(moment.prediction.headings) if moment.prediction is not None else []
     if order.halt_reasons:
         holds = "keeps the boat where it is" if order.keeps_station else "holds the boat"
@@ -181,6 +183,15 @@ def _encounters(moment: Moment) -> list[str]:
         when = f"in {tcpa_s:.1f} s" if tcpa_s > 0.0 else "now"
         lines.append(f"{_planned_for(moment, (each.track_id,))} nearest {when}: {cpa_m:.1f} m, +- {std_m:.1f} m")
     return lines
+
+
+def _soundings(moment: Moment) -> list[str]:
+    """The depth under the boat, and what is wrong with the echo sounder where its soundings do not count."""
+    ahead = moment.prediction
+    if ahead is None or ahead.soundings is SoundingStatus.OFF:
+        return []
+    depth = f"depth {ahead.depth_m:.2f} m" if ahead.depth_m > 0.0 else "no depth yet"
+    return [depth if ahead.soundings is SoundingStatus.OK else f"{depth}, sonar {ahead.soundings.replace('_', ' ')}"]
 
 
 def _headings(verdicts: tuple[HeadingVerdict, ...]) -> list[str]:

@@ -28,7 +28,15 @@ from paani.config.perception import (
 from paani.config.planner import CalibrationConfig, PlannerConfig, calibration_of
 from paani.config.profiles import PROFILES
 from paani.config.recorder import RecorderConfig
-from paani.config.sensors import AisConfig, GpsConfig, HeadingConfig, ImuConfig, LidarConfig, SensorDevicesConfig
+from paani.config.sensors import (
+    AisConfig,
+    GpsConfig,
+    HeadingConfig,
+    ImuConfig,
+    LidarConfig,
+    SensorDevicesConfig,
+    SonarConfig,
+)
 from paani.config.simulator import AdapterConfig, EyeConfig, PlantConfig, SensorsConfig, WorldConfig
 from paani.config.thrusters import EscConfig, ThrustersConfig
 from paani.config.tree import BusConfig, Config, DashboardConfig
@@ -72,6 +80,7 @@ __all__ = [
     "RiskConfig",
     "SensorDevicesConfig",
     "SensorsConfig",
+    "SonarConfig",
     "ThrustersConfig",
     "TrackerConfig",
     "TuningConfig",

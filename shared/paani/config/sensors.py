@@ -1,4 +1,4 @@
-"""Devices of a real hull: GPS, IMU, heading, AIS and lidar, each on a line of its own or several on one."""
+"""Devices of a real hull: GPS, IMU, heading, AIS, lidar and sonar, each on its own line or several on one."""
 
 from __future__ import annotations
 
@@ -63,6 +63,13 @@ class LidarConfig(Section, frozen=True):
     max_range_m: Annotated[float, msgspec.Meta(ge=1.0, le=100.0)] = 12.0  # of an LD06 or LD19
 
 
+class SonarConfig(Section, frozen=True):
+    """An echo sounder under the hull. What it finds shallow becomes an obstacle; it frees no water."""
+
+    line: str = ""  # none unless one is named; most sounders speak 4800 baud
+    transducer_m: NonNegative = 0.19  # how deep it lies below the water's surface: the draught of the paper's boat
+
+
 class SensorDevicesConfig(Section, frozen=True):
     """What is on the boat's lines. Nothing is published for a device that is not set."""
 
@@ -71,6 +78,7 @@ class SensorDevicesConfig(Section, frozen=True):
     heading: HeadingConfig = HeadingConfig()
     ais: AisConfig = AisConfig()
     lidar: LidarConfig = LidarConfig()
+    sonar: SonarConfig = SonarConfig()
     # East positive; makes magnetic headings true. Unset: only headings that bring their own variation are used,
     # because a wrong one turns the boat.
     variation_deg: Degrees | None = None
@@ -78,8 +86,8 @@ class SensorDevicesConfig(Section, frozen=True):
     @property
     def lines(self) -> Mapping[str, str]:
         """The line of each device by its role, "" where none is named."""
-        devices = (("gps", self.gps), ("imu", self.imu), ("heading", self.heading), ("ais", self.ais))
-        return {role: device.line for role, device in (*devices, ("lidar", self.lidar))}
+        names = ("gps", "imu", "heading", "ais", "lidar", "sonar")
+        return {name: getattr(self, name).line for name in names}
 
     def __post_init__(self) -> None:
         """Every line is one that can be opened."""

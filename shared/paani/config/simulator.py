@@ -38,6 +38,12 @@ class SensorsConfig(Section, frozen=True):
     compass_bias_std_rad: NonNegative = 0.02  # constant over a drive, drawn at its start
     ais: bool = True  # whether the boat has a receiver
     lidar: bool = False  # whether it has a range scanner, which costs as much as the board
+    sonar: bool = False  # whether the boat has an echo sounder: most small boats have none
+    sonar_rate_hz: Positive = 5.0  # of a common one; NMEA sounders speak once or twice a second
+    sonar_std_m: NonNegative = 0.01  # of one sounding, as cheap sounders state it
+    sonar_std_frac: NonNegative = 0.01  # of one sounding, of its range, as cheap sounders state it
+    sonar_min_m: NonNegative = 0.3  # blind zone under the transducer, while it still rings
+    sonar_max_m: Positive = 50.0  # beyond it no echo of a soft bottom comes back
 
 
 class AdapterConfig(Section, frozen=True):

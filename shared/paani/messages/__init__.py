@@ -28,6 +28,7 @@ from paani.messages.advisor import (
 from paani.messages.ais import AisVessel, AisVessels
 from paani.messages.camera import PictureHeader, TimeBase
 from paani.messages.decision import InputMessage, OutputMessage, Step
+from paani.messages.depth import Depth, SoundingStatus
 from paani.messages.guidance import STATION_ASTERN_MPS, Arming, Inhibit, NavCommand, Odometry, Route, Thrust, Waypoint
 from paani.messages.header import BoxXyxy, Count, Finite, Message, NonNegative, Signed, Stamp, Text, Unit
 from paani.messages.health import DropCount, Health, InputHealth, Pulse
@@ -90,6 +91,7 @@ __all__ = [
     "Constraint",
     "Count",
     "Counterfactual",
+    "Depth",
     "Detection",
     "Direction",
     "Disagreement",
@@ -159,6 +161,7 @@ __all__ = [
     "Shadow",
     "Signed",
     "SimTime",
+    "SoundingStatus",
     "Stamp",
     "Step",
     "Text",

@@ -7,6 +7,7 @@ from enum import StrEnum
 import msgspec
 
 from paani.messages.ais import Mmsi
+from paani.messages.depth import SoundingStatus
 from paani.messages.guidance import Waypoint
 from paani.messages.header import Count, Finite, Message, NonNegative, Text
 
@@ -116,6 +117,7 @@ class Prediction(Message, frozen=True, kw_only=True):
     `home`: where it would return to; empty before that is known, else one point. Nothing is decided by this message.
     `courtesy`: the nearest encounter in words, and what the order does about it; empty without one.
     `headings`: why each was taken or refused, the desired course first; empty without a plan of the last second.
+    `soundings`: what is made of the echo sounder's; `depth_m`: the newest that was believed, 0 before one was.
     """
 
     path: tuple[Waypoint, ...] = ()
@@ -123,3 +125,5 @@ class Prediction(Message, frozen=True, kw_only=True):
     home: tuple[Waypoint, ...] = ()
     courtesy: Text = ""
     headings: tuple[HeadingVerdict, ...] = ()
+    soundings: SoundingStatus = SoundingStatus.OFF
+    depth_m: NonNegative = 0.0

@@ -17,6 +17,7 @@ class SensorRole(StrEnum):
     HEADING = "heading"
     AIS = "ais"
     LIDAR = "lidar"
+    SONAR = "sonar"
 
 
 class SensorStatus(StrEnum):

@@ -24,11 +24,13 @@ from paani_sim.plant.sensors import (
     measure_gps,
     measure_imu,
 )
+from paani_sim.plant.sonar import Sonar
 from paani_sim.vessels import Vessel, load_vessel
 from paani_sim.water.surroundings import CALM, Surroundings
 from paani_sim.water.wakes import WakeSource
 from paani_sim.water.water import Water
 from paani_sim.worlds import Fault, Scenario, World
+from paani_sim.worlds.bathymetry import depth_at_m
 from paani_sim.worlds.sizes import makes_waves
 from paani_sim.worlds.spec import build_spec
 
@@ -41,7 +43,7 @@ class PlantDiverged(Exception):
 
 
 class ContactStart(NamedTuple):
-    """The boat began to touch the geom of this name: an obstacle's or actor's id, or `bank_<n>`."""
+    """The boat began to touch the geom of this name: an obstacle's or actor's id, `bank_<n>`, or `shoal_<n>`."""
 
     time_s: float
     name: str
@@ -56,7 +58,7 @@ class Plant:
     def __init__(self, world: World, config: PlantConfig, seed: int = 1, faults: tuple[Fault, ...] = ()) -> None:
         """Compile the world and put the boat at its start. Raises UserError for the vessel.
 
-        Of the faults it acts on those of GPS, compass, gyro and thrusters.
+        Of the faults it acts on those of GPS, compass, gyro, sonar and thrusters.
         """
         self._config, self._world, self._faults = config, world, faults
         self._vessel = load_vessel(config.vessel or Scenario.vessel)
@@ -89,7 +91,7 @@ class Plant:
         self._mocap = [self._model.body(actor.id).mocapid[0] for actor in world.actors]
         self._vessels = [index for index, actor in enumerate(world.actors) if makes_waves(actor)]
 
-        biases, gps, imu, water, ais, lidar = np.random.SeedSequence(seed).spawn(6)
+        biases, gps, imu, water, ais, lidar, sonar = np.random.SeedSequence(seed).spawn(7)
         self._gps_rng, self._imu_rng = np.random.default_rng(gps), np.random.default_rng(imu)
         self._errors = initial_errors(config.sensors, np.random.default_rng(biases))
         self._water = Water(world, self._vessel, len(self._vessels), water)
@@ -98,6 +100,7 @@ class Plant:
         self._scanner = RangeScanner(
             self._model, boat, self._vessel.buoyancy.equilibrium_z_m, np.random.default_rng(lidar)
         )
+        self._sonar = Sonar(config.sensors, self._vessel.draught_m, np.random.default_rng(sonar))
         self._last_fix = GpsReading(world.origin_lat_deg, world.origin_lon_deg, 0.0, 0.0, 0.0, fix=False)
 
         self.steps = 0
@@ -206,6 +209,12 @@ class Plant:
     def read_lidar(self) -> tuple[float, ...]:
         """The ranges of one turn of the scanner [m], 0 where nothing was met; see `RangeScanner`."""
         return self._scanner.scan(self._data)
+
+    def read_sonar(self) -> float | None:
+        """One sounding [m]; None without an echo. To be read at `sonar_rate_hz`."""
+        depth_m = depth_at_m(self._world, *self.position_m)
+        heave_m = self.z_m - self._vessel.buoyancy.equilibrium_z_m
+        return self._sonar.measure(depth_m, heave_m, self._faults, self.sim_us * 1e-6)
 
     def state_hash(self) -> str:
         """SHA-256 of position and velocity, to compare runs bit by bit."""

@@ -50,6 +50,12 @@ def scan_message(plant: Plant, source_us: int) -> m.RangeScan:
     )
 
 
+def depth_message(plant: Plant, source_us: int) -> m.Depth:
+    """Read the echo sounder."""
+    depth_m = plant.read_sonar()
+    return m.Depth(source_us=source_us, depth_m=depth_m or 0.0, available=depth_m is not None)
+
+
 def pose_message(plant: Plant, source_us: int) -> m.TruePose:
     """Simulator truth."""
     (x_m, y_m), angles, (surge_mps, sway_mps, yaw_rate) = plant.position_m, plant.attitude, plant.velocity
@@ -83,12 +89,13 @@ class Measurements:
     def __init__(self, bus: Bus, config: PlantConfig) -> None:
         self._gps, self._imu = bus.publisher(keys.GPS), bus.publisher(keys.IMU)
         self._ais, self._pose = bus.publisher(keys.AIS), bus.publisher(keys.TRUE_POSE)
-        self._scan = bus.publisher(keys.SCAN)
+        self._scan, self._depth = bus.publisher(keys.SCAN), bus.publisher(keys.DEPTH)
         rate_hz = 1.0 / config.step_s
         self._gps_every = max(1, round(rate_hz / config.sensors.gps_rate_hz))
         self._imu_every = max(1, round(rate_hz / config.sensors.imu_rate_hz))
         self._ais_every = max(1, round(rate_hz / keys.AIS.rate_hz)) if config.sensors.ais else 0
         self._scan_every = max(1, round(rate_hz / keys.SCAN.rate_hz)) if config.sensors.lidar else 0
+        self._depth_every = max(1, round(rate_hz / config.sensors.sonar_rate_hz)) if config.sensors.sonar else 0
         self._pose_every = report_every(config)
 
     def publish(self, plant: Plant, source_us: int) -> None:
@@ -101,5 +108,7 @@ class Measurements:
             self._ais.put(ais_message(plant, source_us))
         if self._scan_every and plant.steps % self._scan_every == 0:
             self._scan.put(scan_message(plant, source_us))
+        if self._depth_every and plant.steps % self._depth_every == 0:
+            self._depth.put(depth_message(plant, source_us))
         if plant.steps % self._pose_every == 0:
             self._pose.put(pose_message(plant, source_us))

@@ -25,7 +25,7 @@ from paani_sim.trials.drive_states import DriveOutcome
 from paani_sim.trials.fingerprint import FingerprintReader
 from paani_sim.trials.ledger import Ledger
 from paani_sim.trials.policies import PEERS, Policy, load_policy_config
-from paani_sim.trials.result import TrialResult
+from paani_sim.trials.result import SHOAL, TrialResult
 from paani_sim.trials.run_suite import FailedDrive, find_stored_results, run_cases, run_cases_on
 from paani_sim.trials.run_trial import load_case_config, require_swept_effect, run_trial
 from paani_sim.trials.seed_parts import SeedChoice, SeedPart, parse_seeds, part_of_seed
@@ -33,9 +33,10 @@ from paani_sim.trials.suite_summary import summarise_suite
 from paani_sim.trials.summary_table import format_summary
 from paani_sim.trials.sweep import plot_sweep, tabulate_sweep
 from paani_sim.trials.trial_cases import SUITES, TrialCase, is_fixed_scenario, list_cases, parse_case
-from paani_sim.worlds import WORLDS
+from paani_sim.worlds.generate import DRAWN_WORLDS
 from paani_sim.worlds.imazu import IMAZU_SCENARIOS
 from paani_sim.worlds.load import load_scenario
+from paani_sim.worlds.shallows import SHALLOWS
 
 
 def main(argv: list[str]) -> int:
@@ -173,21 +174,27 @@ def _run_one(options: argparse.Namespace) -> int:
         sys.stdout.write(indented_json(result).decode())
     sys.stderr.write(
         f"{case.name} ({result.part.value} seed): {result.why.value}, "
-        f"{result.collisions} contacts, {result.near_misses} near misses, "
+        f"{result.collisions} contacts{_groundings(result)}, {result.near_misses} near misses, "
         f"{result.progress_m:.1f} of {result.goal_m:.1f} m in {result.seconds:.0f} s; "
         f"{effort.simulated_s / effort.wall_s:.1f} x real time\n"
     )
     return 1 if result.why is DriveOutcome.DIVERGED else 0
 
 
+def _groundings(result: TrialResult) -> str:
+    """How many of the contacts were with the ground; "" without one."""
+    count = sum(each.kind == SHOAL for each in result.contacts)
+    return f" ({count} aground)" if count else ""
+
+
 def _list_suite_cases(options: argparse.Namespace, choice: SeedChoice) -> list[TrialCase]:
     worlds = options.scenario or options.worlds or list(SUITES[options.suite].worlds)
-    known = (*WORLDS, *IMAZU_SCENARIOS)
+    known = (*DRAWN_WORLDS, *IMAZU_SCENARIOS)
     for world in worlds:
         if options.scenario:
             load_scenario(world)
         elif world not in known:
-            raise UserError(f"--worlds {world}: no such world (have: {', '.join(WORLDS)})")
+            raise UserError(f"--worlds {world}: no such world (have: {', '.join(DRAWN_WORLDS)})")
     return list_cases(SUITES[options.suite], worlds, options.policy, choice, options.sweep)
 
 
@@ -211,7 +218,9 @@ def _parser() -> argparse.ArgumentParser:
         default=[policy for policy in Policy if policy not in PEERS],
         help=f"who drives: {', '.join(Policy)} (default: all but the peers {', '.join(PEERS)})",
     )  # fmt: skip
-    parser.add_argument("--worlds", nargs="+", metavar="WORLD", help=f"of {', '.join(WORLDS)} (default: all)")
+    parser.add_argument(
+        "--worlds", nargs="+", metavar="WORLD", help=f"of {', '.join(DRAWN_WORLDS)} (default: all but {SHALLOWS})"
+    )
     parser.add_argument("--scenario", nargs="+", default=[], metavar="NAME|FILE", help="instead of worlds")
     parser.add_argument(
         "--jobs", type=whole_number(), default=os.cpu_count() or 1, metavar="N", help="drives side by side"

@@ -16,7 +16,14 @@ from paani.cores import load_estimator
 from paani.motion_planning import MotionPlanner
 from paani.thrust_adapter import AppliedThrust, InForce, ThrustAdapter, applied_message
 from paani_sim.plant.plant import Plant, PlantDiverged
-from paani_sim.plant.telemetry import ais_message, gps_message, imu_message, pose_message, scan_message
+from paani_sim.plant.telemetry import (
+    ais_message,
+    depth_message,
+    gps_message,
+    imu_message,
+    pose_message,
+    scan_message,
+)
 from paani_sim.trials.autonomy_stack import AutonomyStack
 from paani_sim.trials.drive_history import DriveHistory
 from paani_sim.trials.drive_states import DriveOutcome, DrivePhase
@@ -96,6 +103,7 @@ class Drive:
                 "gps": sensors.gps_rate_hz,
                 "ais": keys.AIS.rate_hz,
                 "lidar": keys.SCAN.rate_hz,
+                "depth": sensors.sonar_rate_hz,
                 "estimate": config.localization.rate_hz,
                 "report": config.plant.publish_rate_hz,
                 "look": processed_frame_rate_hz(config),
@@ -179,6 +187,10 @@ class Drive:
             scan = self._bus.put(keys.SCAN, scan_message(self.plant, now_us))
             if linked:
                 self.autonomy.deliver(keys.SCAN, scan)
+        if self.config.plant.sensors.sonar and self._is_due("depth"):
+            sounding = self._bus.put(keys.DEPTH, depth_message(self.plant, now_us))
+            if linked:
+                self.autonomy.deliver(keys.DEPTH, sounding)
 
     def _update_estimate(self, now_us: int, *, linked: bool) -> None:
         if not self._is_due("estimate"):

@@ -15,7 +15,7 @@ from paani_sim.trials.imazu_sheet import draw_imazu_sheet
 from paani_sim.trials.imazu_summary import ImazuSummary
 from paani_sim.trials.intervals import Share
 from paani_sim.trials.policies import Policy
-from paani_sim.trials.result import CLOSENESS_LIMIT_M, Closeness, TrialResult
+from paani_sim.trials.result import CLOSENESS_LIMIT_M, SHOAL, Closeness, TrialResult
 from paani_sim.trials.seed_parts import SeedPart
 from paani_sim.trials.suite_summary import PolicyFigures, Summary
 from paani_sim.trials.summary_table import describe_seeds
@@ -192,8 +192,8 @@ def _fault_table(summary: Summary) -> str:
 def _drive_section(each: RepeatedDrive, result: TrialResult, folder: str) -> str:
     facts = [f"{result.progress_m:.1f} of {result.goal_m:.1f} m in {result.seconds:.0f} s: {result.why.value}"]
     facts += [
-        f'<span class="bad">touched {escape(c.what)} ({c.kind})</span> at {c.at_s:.1f} s, {c.speed_mps:.2f} m/s, '
-        + ("in view" if c.visible else "out of view")
+        f'<span class="bad">{"ran aground on" if c.kind == SHOAL else "touched"} {escape(c.what)} ({c.kind})</span> '
+        f"at {c.at_s:.1f} s, {c.speed_mps:.2f} m/s, " + ("in view" if c.visible else "out of view")
         for c in result.contacts
     ]
     facts += [

@@ -49,6 +49,9 @@ def is_near_miss(encounter: Encounter) -> bool:
     return encounter.closeness is not Closeness.CONTACT and encounter.clearance_m < NEAR_MISS_CLEARANCE_M
 
 
+SHOAL = "shoal"  # kind of a contact by which the boat runs aground
+
+
 class Contact(msgspec.Struct, frozen=True, kw_only=True):
     """One touch. `visible`: the camera could have seen it in the five seconds before."""
 

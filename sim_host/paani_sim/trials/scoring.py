@@ -28,6 +28,7 @@ from paani_sim.trials.hull_clearance import (
 from paani_sim.trials.policies import Policy, processed_frame_rate_hz
 from paani_sim.trials.result import (
     CLOSENESS_LIMIT_M,
+    SHOAL,
     Closeness,
     Contact,
     Encounter,
@@ -40,6 +41,7 @@ from paani_sim.trials.rule_encounters import RuleEncounter, measure_rule_encount
 from paani_sim.trials.seed_parts import part_of_seed
 from paani_sim.vessels.vessel import Hull
 from paani_sim.worlds import Kind, World
+from paani_sim.worlds.bathymetry import SHOAL_GEOM_PREFIX
 from paani_sim.worlds.imazu import IMAZU_SCENARIOS
 
 ENCOUNTER_RANGE_M = {
@@ -152,7 +154,8 @@ def find_contacts(
                 x_m=round(samples[k].x_m, 2),
                 y_m=round(samples[k].y_m, 2),
                 speed_mps=round(abs(samples[max(0, k - 2)].surge_mps), 3),
-                visible=was_visible(world, what, before, half_fov_rad, VISIBLE_RANGE_M, eye.camera_forward_m),
+                visible=kinds.get(what) != SHOAL
+                and was_visible(world, what, before, half_fov_rad, VISIBLE_RANGE_M, eye.camera_forward_m),
             )
         )
     return tuple(found)
@@ -192,8 +195,9 @@ def classify_closeness(clearance_m: float) -> Closeness:
 
 
 def map_kinds(world: World) -> dict[str, str]:
-    """Kind of each thing in the water, by id."""
-    return {thing.id: thing.kind.value for thing in list_waterborne(world)} | {BANK: BANK}
+    """Kind of each thing in the water, and of each shoal, by id."""
+    shoals = {f"{SHOAL_GEOM_PREFIX}{number}": SHOAL for number in range(len(world.shoals))}
+    return {thing.id: thing.kind.value for thing in list_waterborne(world)} | {BANK: BANK} | shoals
 
 
 def summarise_stops(stops: Sequence[StopInterval], end_s: float) -> tuple[StopTotals, ...]:

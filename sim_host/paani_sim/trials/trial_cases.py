@@ -15,7 +15,7 @@ from paani_sim.trials.conditions import TRAFFIC, parse_setting, traffic_of, with
 from paani_sim.trials.policies import Policy
 from paani_sim.trials.seed_parts import SeedChoice, list_seeds
 from paani_sim.worlds import WORLDS, Fault, FaultKind, Scenario
-from paani_sim.worlds.generate import draw_random_scenario
+from paani_sim.worlds.generate import DRAWN_WORLDS, draw_random_scenario
 from paani_sim.worlds.imazu import IMAZU_SCENARIOS
 from paani_sim.worlds.load import SCENARIOS, load_scenario
 
@@ -34,6 +34,8 @@ SUITE_FAULTS = {
     FaultKind.LINK_LOSS: (3.0, 0.0),
     FaultKind.THRUSTER_LOSS: (20.0, 0.5),
 }
+# Of a drive that asks for it by name: the boats of the suites carry no sonar.
+OTHER_FAULTS = {FaultKind.SONAR_FROZEN: (600.0, 0.0)}
 FAULT_ROUTE_LENGTH_M = 25.0  # long enough for a boat under way to meet its fault and to go on after it
 CAMERA_FAULTS = tuple(kind for kind in SUITE_FAULTS if kind.name.startswith("CAMERA"))
 
@@ -141,8 +143,8 @@ def parse_case(text: str) -> TrialCase:
     seed, _, policy = rest.partition(FIELD_SEPARATOR)
     place, _, fault = place.partition(FAULT_SEPARATOR)
     world, _, swept = place.partition(SWEPT_SEPARATOR)
-    if not (is_fixed_scenario(world) or world in WORLDS):
-        raise UserError(f"--one {text}: no world '{world}' (have: {', '.join((*WORLDS, *SCENARIOS))}; or a file)")
+    if not (is_fixed_scenario(world) or world in DRAWN_WORLDS):
+        raise UserError(f"--one {text}: no world '{world}' (have: {', '.join((*DRAWN_WORLDS, *SCENARIOS))}; or a file)")
     if fault and fault not in set(FaultKind):
         raise UserError(f"--one {text}: no fault '{fault}' (have: {', '.join(FaultKind)})")
     if policy not in set(Policy):
@@ -170,7 +172,7 @@ def build_scenario(case: TrialCase) -> Scenario:
     if not case.fault:
         return scenario
     kind = FaultKind(case.fault)
-    duration_s, amount = SUITE_FAULTS[kind]
+    duration_s, amount = (SUITE_FAULTS | OTHER_FAULTS)[kind]
     rng = np.random.default_rng([zlib.crc32(case.condition.encode()), case.seed])
     fault = Fault(kind, round(float(rng.uniform(*FAULT_START_RANGE_S)), 2), duration_s, amount)
     task = dataclasses.replace(

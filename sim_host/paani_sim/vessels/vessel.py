@@ -11,6 +11,7 @@ import msgspec
 from paani.config.section import Fraction, NonNegative, Positive, Section
 from paani.errors import UserError
 from paani.undecodable import UNDECODABLE
+from paani_sim.water.waves import GRAVITY_MPS2
 
 _FOLDER = Path(__file__).parent
 VESSELS = tuple(sorted(file.stem for file in _FOLDER.glob("*.toml")))
@@ -94,6 +95,11 @@ class Vessel(Section, frozen=True):
     fans: FanPair
     windage: Windage
     wave_reflection_frac: Fraction
+
+    @property
+    def draught_m(self) -> float:
+        """How deep the hull lies at rest: the spring in heave is a waterplane's, and a box on that is so deep (K6)."""
+        return self.hull.mass_kg * GRAVITY_MPS2 / self.buoyancy.heave_stiffness
 
 
 def load_vessel(name: str) -> Vessel:

@@ -16,6 +16,7 @@ class FaultKind(StrEnum):
     GPS_JUMP = "gps_jump"  # offset to the east [m]
     COMPASS_BIAS = "compass_bias"  # [rad]
     GYRO_BIAS = "gyro_bias"  # on the yaw rate [rad/s]
+    SONAR_FROZEN = "sonar_frozen"  # it repeats the last depth before, or one amount [m] where that is above 0
     LINK_LOSS = "link_loss"  # nothing crosses between board and host
     THRUSTER_LOSS = "thruster_loss"  # force lost by the left fan, 0..1; negative: by the right fan
 

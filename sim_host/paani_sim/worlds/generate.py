@@ -9,12 +9,13 @@ from typing import NamedTuple
 import numpy as np
 
 from paani.arrays import F64
-from paani_sim.worlds import encounter_paths, load_world, traffic
+from paani_sim.worlds import WORLDS, encounter_paths, load_world, traffic
 from paani_sim.worlds.encounter_paths import NOMINAL_BOAT_MPS, TimedPath
 from paani_sim.worlds.meeting_place import MeetingPlace, build_actor
 from paani_sim.worlds.passability import PassabilityGrid, obstacle_distance_m
 from paani_sim.worlds.route_frame import RouteFrame, cut_route
 from paani_sim.worlds.scenario import Scenario, Task
+from paani_sim.worlds.shallows import SHALLOWS, SHALLOWS_OF, add_shoals
 from paani_sim.worlds.sizes import SIZES
 from paani_sim.worlds.waterway import WATERWAY, build_waterway, draw_waterway_light
 from paani_sim.worlds.world import (
@@ -37,6 +38,7 @@ END_CLEARANCE_M = 4.0
 GOAL_CLEARANCE_M = 8.0  # no encounter is nearer to the goal, and no obstacle nearer behind it
 MAX_ENCOUNTERS = 4
 MAX_TRIES = 60
+DRAWN_WORLDS = (*WORLDS, SHALLOWS)  # the suites of trials drive in `WORLDS` alone
 FETCH_M = {"lake": 200.0, "river": 80.0, "canal": 40.0, "harbour": 120.0}
 WATER_COLOURS_RGB = ((0.30, 0.34, 0.22), (0.40, 0.36, 0.24), (0.20, 0.28, 0.26), (0.16, 0.24, 0.30), (0.46, 0.42, 0.32))
 BUOYS = ("can", "cone", "sphere", "pillar", "spar")
@@ -55,17 +57,28 @@ class Traffic(NamedTuple):
     people_factor: int = 1
 
 
+class Section(NamedTuple):
+    """A stretch of a world: the world cut to it, its route, length, and what of it is passable."""
+
+    world: World
+    route: RouteFrame
+    length_m: float
+    lattice: PassabilityGrid
+
+
 AS_DRAWN = Traffic()
 DrawThing = Callable[[MeetingPlace, np.random.Generator], Obstacle | Actor | None]
 DrawEncounter = Callable[[MeetingPlace, np.random.Generator], Sequence[Obstacle | Actor]]
 
 
 def draw_random_scenario(kind: str, seed: int, met: Traffic = AS_DRAWN) -> Scenario:
-    """The scenario of this kind of world and seed (0 or more), always the same. Raises UserError for an unknown world.
+    """The scenario of one of `DRAWN_WORLDS` and a seed (0 or more), always the same. Raises UserError for another.
 
     The boat follows an open stretch of the world's route. Whatever is met, a gap of 3 m leads on at any time.
     """
     rng = np.random.default_rng([zlib.crc32(kind.encode()), seed])
+    if kind == SHALLOWS:
+        return _draw_shallows(seed, rng)
     world: World
     draw: DrawEncounter
     if kind == WATERWAY:
@@ -79,6 +92,21 @@ def draw_random_scenario(kind: str, seed: int, met: Traffic = AS_DRAWN) -> Scena
             break
     if kind == WATERWAY:
         found = dataclasses.replace(found, light=draw_waterway_light(seed, found.start.yaw_rad))
+    return _follow_route(found, kind, seed)
+
+
+def _draw_shallows(seed: int, rng: np.random.Generator) -> Scenario:
+    """Shoals alone are met, so that nothing else decides how a drive ends."""
+    own = _draw_weather(load_world(str(rng.choice(SHALLOWS_OF))), rng)
+    water = dataclasses.replace(own, actors=())
+    while True:
+        section = _draw_section(water, rng)
+        found = None if section is None else add_shoals(*section, rng)
+        if found is not None:
+            return _follow_route(found, SHALLOWS, seed)
+
+
+def _follow_route(found: World, kind: str, seed: int) -> Scenario:
     length_m = found.route_length_m
     return Scenario(
         name=f"random:{kind}:{seed}",
@@ -92,16 +120,10 @@ def _draw_route_with_encounters(
     world: World, draw: DrawEncounter, met: Traffic, rng: np.random.Generator
 ) -> World | None:
     """A stretch somewhere along the route with at least one encounter, or None where it does not work out."""
-    from_m, length_m = rng.uniform(0.0, world.route_length_m), rng.uniform(*ROUTE_LENGTH_RANGE_M)
-    route = RouteFrame(world.route_m, closed=world.route_closed, first_m=from_m)
-    section = cut_route(world, from_m, length_m)
-    lattice = PassabilityGrid(section, route, length_m)
-    start_gap_m = obstacle_distance_m(section.obstacles, np.array([section.start[:2]]))[0]
-    goal_gap_m = obstacle_distance_m(section.obstacles, route.line_m(length_m, length_m + GOAL_CLEARANCE_M)).min()
-    if min(start_gap_m, goal_gap_m) < END_CLEARANCE_M or not lattice.is_passable(
-        section.obstacles, (), MIN_PASSAGE_M, NOMINAL_BOAT_MPS
-    ):
+    found = _draw_section(world, rng)
+    if found is None:
         return None
+    section, route, length_m, lattice = found
     drawn, meetings_m = int(rng.integers(1, MAX_ENCOUNTERS + 1)), list[float]()
     wanted = met.encounters or drawn
     for number in range(MAX_TRIES):
@@ -121,6 +143,21 @@ def _draw_route_with_encounters(
             if len(meetings_m) == wanted:
                 break
     return section if meetings_m else None
+
+
+def _draw_section(world: World, rng: np.random.Generator) -> Section | None:
+    """A stretch somewhere along the route that leads past what lies there, or None where it does not work out."""
+    from_m, length_m = rng.uniform(0.0, world.route_length_m), rng.uniform(*ROUTE_LENGTH_RANGE_M)
+    route = RouteFrame(world.route_m, closed=world.route_closed, first_m=from_m)
+    section = cut_route(world, from_m, length_m)
+    lattice = PassabilityGrid(section, route, length_m)
+    start_gap_m = obstacle_distance_m(section.obstacles, np.array([section.start[:2]]))[0]
+    goal_gap_m = obstacle_distance_m(section.obstacles, route.line_m(length_m, length_m + GOAL_CLEARANCE_M)).min()
+    if min(start_gap_m, goal_gap_m) < END_CLEARANCE_M or not lattice.is_passable(
+        section.obstacles, (), MIN_PASSAGE_M, NOMINAL_BOAT_MPS
+    ):
+        return None
+    return Section(section, route, length_m, lattice)
 
 
 def _draw_encounter(place: MeetingPlace, rng: np.random.Generator) -> Sequence[Obstacle | Actor]:

@@ -23,7 +23,7 @@ from paani_sim.worlds.route_frame import cut_route, start_pose
 from paani_sim.worlds.scenario import Scenario, Task
 from paani_sim.worlds.scenario_check import check_legs, check_scenario
 from paani_sim.worlds.scenario_file import FencePart, RoutePart, ScenarioFile, read_scenario_file
-from paani_sim.worlds.scenario_things import build_thing
+from paani_sim.worlds.scenario_things import build_shoal, build_thing
 from paani_sim.worlds.world import Light, Obstacle, World
 
 FOLDER = Path(__file__).parent.parent / "scenarios"
@@ -87,6 +87,11 @@ def _load_file(path: Path) -> Scenario:
             world = dataclasses.replace(world, obstacles=(*world.obstacles, thing))
         else:
             world = dataclasses.replace(world, actors=(*world.actors, thing))
+    own = world
+    shoals = tuple(
+        build_shoal(part, own, f"{where}: depth.shoals[{number}]") for number, part in enumerate(file.depth.shoals)
+    )
+    world = dataclasses.replace(own, shoals=(*own.shoals, *shoals))
     distance_m = file.task.distance_m or world.route_length_m
     scenario = Scenario(
         name=path.stem,
@@ -116,6 +121,7 @@ def _build_world(file: ScenarioFile) -> World:
         shore_m=own.shore_m if part.banks else _open_water(own),
         obstacles=own.obstacles if part.obstacles else tuple(o for o in own.obstacles if o.look == "bridge"),
         actors=own.actors if part.actors else (),
+        bottom_m=_given_or(file.depth.bottom_m, own.bottom_m),
         light=_build_light(file, own.light),
         wind=dataclasses.replace(
             own.wind,

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from paani.arrays import F64, U8
 from paani.statistics.charts import Axes
+from paani_sim.worlds.curves import circle
 from paani_sim.worlds.footprint import build_outline, is_shaped, place_outline
 from paani_sim.worlds.scenario import Scenario
 from paani_sim.worlds.world import Actor, Bank, Kind, Obstacle, Pose2, actor_pose_at
@@ -16,6 +17,7 @@ from paani_sim.worlds.world import Actor, Bank, Kind, Obstacle, Pose2, actor_pos
 Bgr = tuple[int, int, int]
 
 WATER: Bgr = (222, 196, 160)
+SHOAL: Bgr = (196, 214, 206)
 LAND: dict[Bank, Bgr] = {Bank.GRASS: (150, 196, 160), Bank.QUAY: (188, 192, 196)}
 INK: Bgr = (40, 40, 40)
 ROUTE: Bgr = (40, 40, 220)
@@ -45,6 +47,8 @@ def draw_plan_view(scenario: Scenario, width_px: int, height_px: int, views: Seq
     canvas.picture[:] = LAND[world.bank]
     canvas.fill_polygon(world.shore_m, WATER)
     canvas.draw_line(world.shore_m, INK, closed=True)
+    for shoal in world.shoals:
+        canvas.fill_polygon(circle((shoal.x_m, shoal.y_m), shoal.radius_m, 32), SHOAL)
     for area in scenario.fence:
         canvas.draw_line(np.array([(p.x_m, p.y_m) for p in area.corners]), FENCE, closed=True, width_px=2)
     for obstacle in world.obstacles:

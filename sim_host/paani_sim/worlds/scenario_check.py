@@ -7,6 +7,8 @@ import numpy as np
 from paani.arrays import F64
 from paani.errors import UserError
 from paani.messages import FenceArea, Keep
+from paani_sim.vessels import load_vessel
+from paani_sim.worlds.bathymetry import find_aground
 from paani_sim.worlds.curves import clearance_m, is_inside, sampled_legs
 from paani_sim.worlds.passability import footprint_distance_m, obstacle_distance_m
 from paani_sim.worlds.scenario import Scenario
@@ -30,6 +32,7 @@ def check_scenario(scenario: Scenario, where: str, names: dict[str, str]) -> Non
         _check_area(np.array([(corner.x_m, corner.y_m) for corner in area.corners]), f"{where}: fence.keep_{area.keep}")
     _check_route(world, scenario.fence, where)
     _check_start(world, where)
+    _check_afloat(scenario, where)
     for thing in things:
         if thing.id in names:
             _check_thing(world, thing, f"{where}: {names[thing.id]}")
@@ -64,6 +67,15 @@ def _check_start(world: World, where: str) -> None:
         over = isinstance(thing, Obstacle) and not np.isfinite(obstacle_distance_m((thing,), here)[0])
         if not over and footprint_distance_m(thing, pose, here)[0] < HULL_RADIUS_M:
             raise UserError(f"{where}: route: the boat starts inside {thing.id!r}")
+
+
+def _check_afloat(scenario: Scenario, where: str) -> None:
+    start, draught_m = scenario.world.start, load_vessel(scenario.vessel).draught_m
+    if scenario.world.bottom_m <= draught_m:
+        raise UserError(f"{where}: depth.bottom_m: no deeper than the boat's draught of {draught_m:.2f} m")
+    number = find_aground(scenario.world, start.x_m, start.y_m, draught_m, HULL_RADIUS_M)
+    if number is not None:
+        raise UserError(f"{where}: depth.shoals[{number}]: the boat starts aground on it")
 
 
 def _check_thing(world: World, thing: Obstacle | Actor, where: str) -> None:

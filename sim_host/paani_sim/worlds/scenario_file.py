@@ -74,6 +74,22 @@ class WeatherPart(Section, frozen=True):
     visibility_m: Annotated[float, msgspec.Meta(ge=20.0, le=1e5)] | None = None
 
 
+class ShoalPart(Section, frozen=True):
+    """A rise of the bottom, round from above; `top_m` of water over its middle."""
+
+    at_m: Point
+    radius_m: Annotated[float, msgspec.Meta(ge=0.5, le=200.0)]
+    top_m: Annotated[float, msgspec.Meta(ge=0.0, le=1000.0)]
+    frame: Literal["map", "route", "channel"] = "map"
+
+
+class DepthPart(Section, frozen=True):
+    """Depth of the water at rest: of its flat bottom, and the shoals on that."""
+
+    bottom_m: Annotated[float, msgspec.Meta(ge=0.5, le=1000.0)] | None = None
+    shoals: Annotated[tuple[ShoalPart, ...], msgspec.Meta(max_length=MAX_ACTORS)] = ()
+
+
 class VesselPart(Section, frozen=True):
     """The vessel profile."""
 
@@ -148,6 +164,7 @@ class ScenarioFile(Section, frozen=True):
     seed: Seed = 1
     light: LightPart = LightPart()
     weather: WeatherPart = WeatherPart()
+    depth: DepthPart = DepthPart()
     vessel: VesselPart = VesselPart()
     route: RoutePart = RoutePart()
     task: TaskPart = TaskPart()

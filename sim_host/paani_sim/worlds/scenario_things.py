@@ -10,9 +10,9 @@ from paani_sim.worlds import encounter_paths
 from paani_sim.worlds.encounter_paths import NOMINAL_BOAT_MPS, Encounter, TimedPath
 from paani_sim.worlds.route_frame import RouteFrame
 from paani_sim.worlds.scenario_check import check_legs
-from paani_sim.worlds.scenario_file import ActorPart
+from paani_sim.worlds.scenario_file import ActorPart, ShoalPart
 from paani_sim.worlds.sizes import SIZES, Size
-from paani_sim.worlds.world import Actor, Obstacle, Pose2, World
+from paani_sim.worlds.world import Actor, Obstacle, Pose2, Shoal, World
 
 
 def build_thing(part: ActorPart, world: World, where: str, fallback_id: str) -> Obstacle | Actor:
@@ -51,6 +51,13 @@ def build_thing(part: ActorPart, world: World, where: str, fallback_id: str) -> 
     )
 
 
+def build_shoal(part: ShoalPart, world: World, where: str) -> Shoal:
+    """Build one shoal in its world. `where` names the file and the part in a UserError."""
+    if part.top_m >= world.bottom_m:
+        raise UserError(f"{where}.top_m: {part.top_m:g} m is not above the bottom at {world.bottom_m:g} m")
+    return Shoal(*_locate(part, world, where, part.at_m, 0.0)[:2], part.radius_m, part.top_m)
+
+
 def _build_obstacle(part: ActorPart, size: Size, world: World, where: str, fallback_id: str) -> Obstacle:
     pose = _locate(part, world, where, part.at_m or (0.0, 0.0), math.radians(part.heading_deg or 0.0))
     return Obstacle(
@@ -73,7 +80,9 @@ def _path_m(part: ActorPart, world: World, where: str) -> F64:
     return path_m
 
 
-def _locate(part: ActorPart, world: World, where: str, point: tuple[float, float], turn_rad: float) -> Pose2:
+def _locate(
+    part: ActorPart | ShoalPart, world: World, where: str, point: tuple[float, float], turn_rad: float
+) -> Pose2:
     if part.frame == "map":
         return Pose2(*point, turn_rad)
     if part.frame == "route":

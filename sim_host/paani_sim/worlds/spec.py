@@ -8,6 +8,7 @@ import numpy as np
 
 from paani.arrays import F64
 from paani_sim.vessels import Vessel, load_vessel
+from paani_sim.worlds.bathymetry import SHOAL_GEOM_PREFIX, semi_axes_m
 from paani_sim.worlds.curves import simplify_polygon
 from paani_sim.worlds.footprint import CORNERS, build_outline, is_round, is_shaped
 from paani_sim.worlds.world import Actor, Obstacle, World, actor_pose_at
@@ -16,10 +17,12 @@ TIMESTEP_S = 0.01
 
 BOAT_BIT = 1  # what the boat is; solids look for it
 SOLID_BIT = 2  # what everything else is; the boat looks for it
+GROUND_BIT = 4  # what shoals are; keels look for it
 
 _BOX = mujoco.mjtGeom.mjGEOM_BOX
 _CAPSULE = mujoco.mjtGeom.mjGEOM_CAPSULE
 _CYLINDER = mujoco.mjtGeom.mjGEOM_CYLINDER
+_ELLIPSOID = mujoco.mjtGeom.mjGEOM_ELLIPSOID
 _MESH = mujoco.mjtGeom.mjGEOM_MESH
 _PLANE = mujoco.mjtGeom.mjGEOM_PLANE
 _SITE = mujoco.mjtObj.mjOBJ_SITE
@@ -38,6 +41,7 @@ def build_spec(world: World, vessel: Vessel | None = None, *, visual: bool = Fal
     Body `boat` on joint `boat_free` with geoms `hull_port`, `hull_starboard`, site `imu` and
     sensors `accelerometer`, `gyro` (body frame, SI). Geoms `bank_<n>`, one geom per obstacle and
     one mocap body and geom per actor, named by id. Only the boat collides, with everything else.
+    Geoms `shoal_<n>` where the world has shoals; geoms `keel_port`, `keel_starboard` of the boat touch them alone.
     `visual` adds colours, a water plane and a light for MuJoCo's own viewer.
     """
     spec = mujoco.MjSpec()
@@ -47,6 +51,7 @@ def build_spec(world: World, vessel: Vessel | None = None, *, visual: bool = Fal
     spec.option.gravity = [0.0, 0.0, -9.81]
     _add_boat(spec, world, vessel or load_vessel("paper"))
     _add_banks(spec, world.shore_m)
+    _add_shoals(spec, world)
     for obstacle in world.obstacles:
         _add_obstacle(spec, obstacle)
     for actor in world.actors:
@@ -83,6 +88,19 @@ def _add_boat(spec: mujoco.MjSpec, world: World, vessel: Vessel) -> None:
             priority=1,  # a wet hull slides along whatever it touches
             rgba=[0.9, 0.5, 0.1, 1.0],
         )
+        if world.shoals:
+            keel_z_m = hull.radius_m - vessel.draught_m - vessel.buoyancy.equilibrium_z_m
+            boat.add_geom(
+                name=name.replace("hull", "keel"),
+                type=_CAPSULE,
+                fromto=[-reach_m, y_m, keel_z_m, reach_m, y_m, keel_z_m],
+                size=[hull.radius_m, 0.0, 0.0],
+                contype=0,
+                conaffinity=GROUND_BIT,
+                friction=[0.3, 0.005, 0.0001],
+                priority=1,
+                rgba=[0.9, 0.5, 0.1, 1.0],
+            )
     boat.add_site(name="imu", pos=[0.0, 0.0, 0.0])
     for name, kind in (
         ("accelerometer", mujoco.mjtSensor.mjSENS_ACCELEROMETER),
@@ -110,6 +128,21 @@ def _add_banks(spec: mujoco.MjSpec, shore_m: F64) -> None:
             contype=SOLID_BIT,
             conaffinity=BOAT_BIT,
             rgba=[0.35, 0.45, 0.2, 1.0],
+        )
+
+
+def _add_shoals(spec: mujoco.MjSpec, world: World) -> None:
+    """Whole ellipsoids: what of them is no shoal lies under the bottom, where nothing is."""
+    for number, shoal in enumerate(world.shoals):
+        across_m, upward_m = semi_axes_m(shoal, world.bottom_m)
+        spec.worldbody.add_geom(
+            name=f"{SHOAL_GEOM_PREFIX}{number}",
+            type=_ELLIPSOID,
+            pos=[shoal.x_m, shoal.y_m, -(shoal.top_m + upward_m)],
+            size=[across_m, across_m, upward_m],
+            contype=GROUND_BIT,
+            conaffinity=0,
+            rgba=[0.6, 0.5, 0.3, 1.0],
         )
 
 

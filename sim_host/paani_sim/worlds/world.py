@@ -128,6 +128,19 @@ class Light:
     rain_mmph: float = 0.0
 
 
+@dataclass(frozen=True)
+class Shoal:
+    """A rise of the bottom under water: the cap of an ellipsoid, round from above.
+
+    `radius_m`: at its foot, on the bottom. `top_m`: depth of the water over its middle.
+    """
+
+    x_m: float
+    y_m: float
+    radius_m: float
+    top_m: float
+
+
 class Bank(StrEnum):
     """What the water's edge is made of."""
 
@@ -143,6 +156,7 @@ class World:
     `channel_m` `(n, 2)` is the centre line of water that flows, downstream; None for still water.
     `start` lies on the route and heads along it. `water_rgb` is the colour of the water's body
     (display values), `season_frac` runs from summer green (0) to autumn (1).
+    `bottom_m` is the depth of the water but for the shoals, which no picture shows. Banks are walls.
     """
 
     name: str
@@ -163,6 +177,8 @@ class World:
     channel_m: F64 | None = None
     waves: Waves = field(default_factory=Waves)
     current: Current = field(default_factory=Current)
+    bottom_m: float = 3.0
+    shoals: tuple[Shoal, ...] = ()
 
     @property
     def route_length_m(self) -> float:

@@ -8,7 +8,7 @@ from paani.clock import has_passed
 from paani.config import PlannerConfig
 from paani.fence_geometry import Fence
 from paani.geometry import wrap_rad
-from paani.messages import AisVessels, Evidence, HeadingVerdict, Odometry, RangeScan, Tracks
+from paani.messages import AisVessels, Depth, Evidence, HeadingVerdict, Odometry, RangeScan, Tracks
 from paani.motion_planning import MotionPlanner, MovingObstacle, PlanningInputs
 from paani_services.navigator.avoidance.fence_cells import apply_fence
 from paani_services.navigator.avoidance.planner import judge_candidates, plan_motion
@@ -18,6 +18,8 @@ from paani_services.navigator.avoidance.verdicts import tell_headings
 from paani_services.navigator.mapping.ais_targets import AisTarget, locate_targets, predict_unseen_targets
 from paani_services.navigator.mapping.observation import ObservationMemory, add_track_ids, update_memory
 from paani_services.navigator.mapping.observed_cells import CELL_M, Camera
+from paani_services.navigator.mapping.shallow_cells import CellNumbers, apply_shallow_cells, cells_on_grid
+from paani_services.navigator.mapping.soundings import SoundingMemory, update_soundings
 from paani_services.navigator.mapping.water_map import is_refuted, map_water
 
 COURSE_TOLERANCE_RAD = math.radians(3.0)  # desired courses this near to each other share a plan
@@ -29,6 +31,7 @@ class PlanBasis(msgspec.Struct, frozen=True, kw_only=True):
 
     map_offset_m: east and north of the boat in the map, less those by dead reckoning. targets: vessels told by AIS.
     scan_us: stamp of the newest range scan; -1 without one.
+    shallow: cells of water that is too shallow, or expected to be.
     """
 
     start: BoatState
@@ -40,6 +43,7 @@ class PlanBasis(msgspec.Struct, frozen=True, kw_only=True):
     escape_mps: float = 0.0
     targets: tuple[AisTarget, ...] = ()
     scan_us: int = -1
+    shallow: CellNumbers = ()
 
 
 class PlannerState(
@@ -47,7 +51,7 @@ class PlannerState(
     frozen=True,
     rename={"advised_side": "side", "waiting_since_us": "waits_us", "frame_id": "frame", "basis": "request"},
 ):
-    """The remembered observations, and the plan in force. It is recorded under the field names given by `rename`.
+    """The remembered observations and soundings, and the plan in force. Recorded under the field names of `rename`.
 
     course_rad, advised_side, planned_us, frame_id: the setpoint, time and newest frame for which the plan was made.
     waiting_since_us: since when no plan has led the boat onward.
@@ -66,6 +70,7 @@ class PlannerState(
     obstacle_track_ids: tuple[int, ...] = ()
     basis: PlanBasis | None = None
     is_nobody_near: bool = False
+    soundings: SoundingMemory = SoundingMemory()
 
 
 def observe(
@@ -75,10 +80,13 @@ def observe(
     config: PlannerConfig,
     tracks: Tracks | None = None,
     scan: RangeScan | None = None,
+    depth: Depth | None = None,
+    now_us: int = 0,
 ) -> PlannerState:
-    """Add the newest odometry, evidence and its tracks if it is of a new frame, and scan to the planner's memory."""
+    """Add what is new to the planner's memory: odometry, evidence of another frame and its tracks, scan, sounding."""
     memory = update_memory(state.memory, odometry, evidence, config, scan)
-    return msgspec.structs.replace(state, memory=add_track_ids(memory, evidence, tracks))
+    soundings = update_soundings(state.soundings, depth, memory, odometry, now_us, config)
+    return msgspec.structs.replace(state, memory=add_track_ids(memory, evidence, tracks), soundings=soundings)
 
 
 def replan(
@@ -116,6 +124,7 @@ def replan(
             escape_mps=setpoint.escape_mps,
             targets=locate_targets(ais, odometry, here, now_us, config),
             scan_us=state.memory.scans[-1].stamp_us if state.memory.scans else -1,
+            shallow=cells_on_grid(state.soundings.cells, (here.x_m, here.y_m)),
         )
         request = _request_plan(state.memory, basis, setpoint, now_us, camera, config, fence)
         plan = plan_motion(request) if planner is None else Plan(*planner(_planning_inputs(request)))
@@ -130,6 +139,7 @@ def replan(
             tuple(sorted({obstacle.track_id for obstacle in request.obstacles} - {0})),
             basis if planner is None else None,
             request.grid.is_recent and request.nearest_person_m() >= PERSON_NEAR_M,
+            state.soundings,
         )
     is_escape = state.basis is not None and plan.speed_mps > state.basis.speed_mps
     allowed_mps = max(setpoint.speed_mps, setpoint.escape_mps) if is_escape else setpoint.speed_mps
@@ -168,7 +178,7 @@ def _request_plan(
     grid, seen = map_water(memory.observations, start[:2], now_us, camera, config, scans)
     unseen = predict_unseen_targets(basis.targets, seen, start[:3], camera.calibration)
     return PlanRequest(
-        grid=apply_fence(grid, fence, basis.map_offset_m),
+        grid=apply_shallow_cells(apply_fence(grid, fence, basis.map_offset_m), basis.shallow),
         start=start,
         setpoint=setpoint,
         config=config,

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from paani.config import AisConfig, GpsConfig, HeadingConfig, ImuConfig, LidarConfig, SensorDevicesConfig
+from paani.config import AisConfig, GpsConfig, HeadingConfig, ImuConfig, LidarConfig, SensorDevicesConfig, SonarConfig
 from paani.messages import GpsFix, ImuSample, SensorDevice, SensorRole, SensorStatus
 from paani_services.sensors.fixes import RESYNC_FIXES
 from paani_services.sensors.suite import SensorSuite
@@ -18,7 +18,8 @@ from tests.unit.paani_services.sensors.written import imu_line, nav_pvt, rmc, se
 
 GPS, IMU, HEADING = "serial:/dev/gps@9600", "serial:/dev/imu", "serial:/dev/compass@4800"
 RECEIVER, SCANNER = "serial:/dev/ais@38400", "serial:/dev/lidar@230400"
-LINES = [GPS, IMU, HEADING, RECEIVER, SCANNER]
+SONAR = "serial:/dev/sonar@4800"
+LINES = [GPS, IMU, HEADING, RECEIVER, SCANNER, SONAR]
 CONFIG = SensorDevicesConfig(
     gps=GpsConfig(line=GPS), imu=ImuConfig(line=IMU), heading=HeadingConfig(line=HEADING), variation_deg=2.0
 )
@@ -352,11 +353,12 @@ def test_the_rate_is_that_of_usable_data() -> None:
 @settings(deadline=None)  # the first example compiles patterns and fills caches
 @given(st.lists(st.tuples(st.sampled_from(LINES), st.binary(max_size=300)), max_size=8))
 def test_any_bytes_on_any_line_are_survived(pieces: list[tuple[str, bytes]]) -> None:
-    bench = Bench(msgspec.structs.replace(CONFIG, ais=AisConfig(line=RECEIVER), lidar=LidarConfig(line=SCANNER)))
+    devices = {"ais": AisConfig(line=RECEIVER), "lidar": LidarConfig(line=SCANNER), "sonar": SonarConfig(line=SONAR)}
+    bench = Bench(msgspec.structs.replace(CONFIG, **devices))
     for address, data in pieces:
         bench.wait(0.1)
         bench.suite.take(address, data, bench.now_us)
-    assert len(bench.suite.report(bench.now_us)) == 5
+    assert len(bench.suite.report(bench.now_us)) == len(SensorRole)
 
 
 BODIES = st.text(st.characters(codec="ascii", exclude_characters="\r\n$!*"), max_size=80)

@@ -101,6 +101,24 @@ def test_the_order_tells_the_encounter_that_it_is_for(log: Path) -> None:
     assert "nearest in" not in narrative_of(msgspec.structs.replace(moment, prediction=None), CONFIG)
 
 
+@pytest.mark.parametrize(
+    ("soundings", "depth_m", "words"),
+    [
+        (m.SoundingStatus.OK, 1.234, "depth 1.23 m\n"),
+        (m.SoundingStatus.FROZEN, 1.234, "depth 1.23 m, sonar frozen\n"),
+        (m.SoundingStatus.NO_ECHO, 0.0, "no depth yet, sonar no echo\n"),
+    ],
+)
+def test_the_order_tells_the_depth_and_what_is_wrong_with_the_sonar(
+    log: Path, soundings: m.SoundingStatus, depth_m: float, words: str
+) -> None:
+    moment = moment_at(open_log(log), T0_US + 8_000_000)
+    ahead = m.Prediction(source_us=1, soundings=soundings, depth_m=depth_m)
+    assert f" {words}" in narrative_of(msgspec.structs.replace(moment, prediction=ahead), CONFIG) + "\n"
+    silent = msgspec.structs.replace(ahead, soundings=m.SoundingStatus.OFF)
+    assert "sonar" not in narrative_of(msgspec.structs.replace(moment, prediction=silent), CONFIG)
+
+
 @pytest.mark.slow
 def test_headings_that_were_not_taken_are_told_with_why(log: Path) -> None:
     """From port to starboard, neighbours alike together; the costs of the cheapest by name."""
