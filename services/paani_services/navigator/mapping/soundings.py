@@ -17,14 +17,14 @@ from paani import portable
 from paani.clock import has_passed
 from paani.config import PlannerConfig
 from paani.messages import Depth, Odometry, SoundingStatus
-from paani_services.navigator.mapping.bottom_plane import Bottom, fit_bottom
+from paani_services.navigator.mapping.bottom_plane import CERTAIN_STD, Bottom, fit_bottom
 from paani_services.navigator.mapping.observation import ObservationMemory
 from paani_services.navigator.mapping.stamped_pose import StampedPose, interpolate_pose
 
 SHALLOW_CELL_M = 0.4  # two cells of the grid: no hull fits between two neighbours
 MAX_SHALLOW_CELLS = 400  # remembered, the oldest are forgotten first; as a shoal of 9 m across
 EXPECTED_S = 120.0  # for which an expectation counts that no sounding refutes, as long as the planner remembers things
-EXPECTED_WITHIN_M = 5.0  # how far a slope is carried on: more than a boat at 0.6 m/s needs to turn or to stop
+EXPECTED_WITHIN_M = 2.5  # how far a slope is carried on: more than a boat at 0.6 m/s needs to turn or to stop
 # Of the soundings that say how the bottom goes on: the short way notices a shoal's foot, the long one a gentle rise.
 TREND_WAYS_M, TREND_S = (0.8, 1.6), 20.0
 TREND_SPACING_M = 0.08  # between two of them: a boat at rest learns no slope
@@ -138,11 +138,10 @@ def _mark(
     """
     cells = {(cell.column, cell.row): cell for cell in memory.cells}
     for each in believed:
-        at = _cell_at(each.x_m, each.y_m)
         if each.depth_m < config.min_depth_m:
-            _put(cells, ShallowCell(*at, each.stamp_us, True))
-        elif at in cells and not cells[at].is_sounded:
-            del cells[at]
+            _put(cells, ShallowCell(*_cell_at(each.x_m, each.y_m), each.stamp_us, True))
+        else:
+            cells = {at: cell for at, cell in cells.items() if cell.is_sounded or not _lies_at(cell, each)}
     last = memory.recent[-1]
     bottoms = _fit_bottoms(memory.recent)
     if bottoms:
@@ -151,7 +150,30 @@ def _mark(
     for bottom in bottoms if has_moved else []:
         for x_m, y_m in _expected_places(bottom, last, yaw_rad, config):
             _put(cells, ShallowCell(*_cell_at(x_m, y_m), last.stamp_us, False))
+    if last.depth_m < config.min_depth_m:
+        heading = portable.cos(yaw_rad), portable.sin(yaw_rad)
+        if not any(_falls_along(fit, heading) for fit in bottoms):
+            _close(cells, last, heading)
     return msgspec.structs.replace(memory, cells=_keep_cells(cells.values(), last.stamp_us))
+
+
+def _close(cells: dict[tuple[int, int], ShallowCell], here: Sounding, heading: tuple[float, float]) -> None:
+    """Close the way ahead of a boat on shallow water: what it has not sounded may be shallower still."""
+    east, north = heading
+    for side in range(-4, 5):
+        x_m = here.x_m + MIN_AHEAD_M * (east - 0.25 * side * north)
+        y_m = here.y_m + MIN_AHEAD_M * (north + 0.25 * side * east)
+        _put(cells, ShallowCell(*_cell_at(x_m, y_m), here.stamp_us, False))
+
+
+def _falls_along(bottom: Bottom, heading: tuple[float, float]) -> bool:
+    slope, east, north = bottom.upward
+    return slope > 0.0 and east * heading[0] + north * heading[1] < 0.0
+
+
+def _lies_at(cell: ShallowCell, sounding: Sounding) -> bool:
+    x_m, y_m = _middle_m(cell, 0.0, 0.0)
+    return math.hypot(x_m - sounding.x_m, y_m - sounding.y_m) < SHALLOW_CELL_M
 
 
 def _fit_bottoms(recent: tuple[Sounding, ...]) -> list[Bottom]:
@@ -169,7 +191,7 @@ def _is_refuted(cell: ShallowCell, bottom: Bottom, last: Sounding, config: Plann
     if cell.is_sounded or math.hypot(x_m - last.x_m, y_m - last.y_m) > EXPECTED_WITHIN_M:
         return False
     depth_m, std_m = bottom.depth_at(x_m, y_m)
-    return depth_m - std_m > config.min_depth_m
+    return depth_m - CERTAIN_STD * std_m > config.min_depth_m
 
 
 def _expected_places(
@@ -177,7 +199,7 @@ def _expected_places(
 ) -> list[tuple[float, float]]:
     """Where the water will be shallow if the bottom goes on as it rose, ahead of the boat or beside it."""
     slope, east, north = bottom.upward
-    if slope == 0.0 or east * portable.cos(yaw_rad) + north * portable.sin(yaw_rad) < 0.0:
+    if slope == 0.0 or _falls_along(bottom, (portable.cos(yaw_rad), portable.sin(yaw_rad))):
         return []
     depth_m, _ = bottom.depth_at(last.x_m, last.y_m)
     away_m = max((depth_m - config.min_depth_m) / slope, MIN_AHEAD_M)
@@ -197,6 +219,8 @@ def _take_lost_echo(memory: SoundingMemory, pose: StampedPose, config: PlannerCo
         return memory
     cells = {(cell.column, cell.row): cell for cell in memory.cells}
     _put(cells, ShallowCell(*_cell_at(pose.x_m, pose.y_m), memory.stamp_us, True))
+    here = Sounding(memory.stamp_us, pose.x_m, pose.y_m, last.depth_m)
+    _close(cells, here, (portable.cos(pose.yaw_rad), portable.sin(pose.yaw_rad)))
     return msgspec.structs.replace(memory, cells=_keep_cells(cells.values(), memory.stamp_us))
 
 

@@ -8,14 +8,14 @@ import math
 import numpy as np
 import pytest
 
-from paani_sim.worlds import Scenario
+from paani_sim.worlds import Scenario, load_world
 from paani_sim.worlds.bathymetry import depth_at_m
 from paani_sim.worlds.curves import clearance_m
 from paani_sim.worlds.generate import DRAWN_WORLDS, draw_random_scenario
 from paani_sim.worlds.load import load_scenario
-from paani_sim.worlds.passability import obstacle_distance_m
-from paani_sim.worlds.route_frame import RouteFrame
-from paani_sim.worlds.shallows import DEEP_M, MAX_SHOALS
+from paani_sim.worlds.passability import PassabilityGrid, obstacle_distance_m
+from paani_sim.worlds.route_frame import RouteFrame, cut_route
+from paani_sim.worlds.shallows import DEEP_M, MAX_SHOALS, add_shoals
 
 SEEDS = 8
 DRAUGHT_M = 0.19
@@ -73,3 +73,10 @@ def test_a_seed_is_always_the_same_water_and_another_is_another() -> None:
     assert again.name == "random:shallows:1"
     assert len({each.world.shoals for each in scenarios()}) == SEEDS
     assert "shallows" in DRAWN_WORLDS
+
+
+def test_water_without_room_for_a_deep_way_past_gets_no_shoal() -> None:
+    canal = load_world("canal")
+    section, route = cut_route(canal, 20.0, 45.0), RouteFrame(canal.route_m, closed=canal.route_closed, first_m=20.0)
+    grid = PassabilityGrid(section, route, 45.0)
+    assert [add_shoals(section, route, 45.0, grid, np.random.default_rng(seed)) for seed in range(4)] == [None] * 4

@@ -15,11 +15,11 @@ from paani.config import PlannerConfig
 from paani.messages import SoundingStatus
 from paani_services.navigator.mapping.observation import ObservationMemory, update_memory
 from paani_services.navigator.mapping.soundings import (
-    EXPECTED_S,
     EXPECTED_WITHIN_M,
     MAX_SHALLOW_CELLS,
     SHALLOW_CELL_M,
     SoundingMemory,
+    name_doubts,
     update_soundings,
 )
 from paani_sim.eye.camera import BoatPose
@@ -109,23 +109,33 @@ def test_what_was_sounded_shallow_stays_an_obstacle() -> None:
 
 def test_what_was_only_expected_is_forgotten_in_time() -> None:
     survey = Survey()
-    survey.sail(20, rising(0.3, 5.0))
+    survey.sail(26, rising(0.3, 5.0))
     assert survey.memory.cells
-    survey.sail(round(0.8 * EXPECTED_S / 0.2), rising(0.3, 5.0), speed_mps=-SPEED_MPS)
-    assert survey.memory.cells
-    survey.sail(round(0.3 * EXPECTED_S / 0.2), rising(0.3, 5.0), speed_mps=-SPEED_MPS)
+    survey.sail(480, rising(0.3, 5.0), speed_mps=-SPEED_MPS)
+    assert survey.memory.cells, "96 s later, and 60 m away"
+    survey.sail(180, rising(0.3, 5.0), speed_mps=-SPEED_MPS)
     assert survey.memory.cells == ()
 
 
-def test_what_was_expected_shallow_and_is_sounded_deep_is_free_again() -> None:
+def test_what_was_expected_shallow_is_free_again_where_the_bottom_is_level_after_all() -> None:
     survey = Survey()
-    survey.sail(20, rising(0.3, 5.0))
-    expected = {(x_m, y_m) for x_m, y_m in survey.places() if abs(y_m) < 0.3}
-    assert expected
-    survey.sail(60, level(2.0))
-    assert survey.x_m > max(x_m for x_m, _ in expected)
-    passed = [(x_m, y_m) for x_m, y_m in survey.places() if 0.0 < y_m < 0.4]
-    assert passed == []
+    survey.sail(24, rising(0.5, 5.0))
+    at_m = survey.x_m
+    assert any(abs(y_m) < 0.3 for _, y_m in survey.places())
+    survey.sail(14, lambda x_m: rising(0.5, 5.0)(min(x_m, at_m)))
+    assert [x_m for x_m, y_m in survey.places() if abs(y_m) < 0.3 and x_m > survey.x_m] == []
+
+
+def test_a_bottom_that_falls_closes_nothing_behind_the_boat() -> None:
+    survey = Survey()
+    assert survey.sail(15, lambda x_m: 0.7 + 0.3 * x_m).cells == ()
+
+
+def test_the_way_on_is_closed_where_the_water_is_too_shallow_already_and_rises_still() -> None:
+    survey = Survey()
+    survey.sail(15, rising(0.3, 0.5))
+    expected = [x_m for (x_m, _), cell in zip(survey.places(), survey.memory.cells, strict=True) if not cell.is_sounded]
+    assert max(expected) > survey.x_m + 0.4
 
 
 def test_memory_is_bounded_and_the_oldest_is_forgotten() -> None:
@@ -138,16 +148,19 @@ def test_memory_is_bounded_and_the_oldest_is_forgotten() -> None:
 
 def test_a_frozen_sonar_is_named_and_what_it_says_then_marks_and_frees_nothing() -> None:
     survey = Survey()
-    survey.sail(20, rising(0.3, 5.0))
-    marked = survey.memory.cells
-    survey.sail(25, level(3.0), errs=False)
+    survey.sail(26, rising(0.3, 5.0))
+    assert survey.memory.cells
+    survey.sail(15, level(survey.memory.depth_m), errs=False)
     assert survey.memory.status is SoundingStatus.FROZEN
+    assert name_doubts(survey.memory) == ("sonar frozen",)
     assert survey.memory.recent == ()
     kept = survey.memory.cells
-    assert set(kept) <= set(marked)
-    survey.sail(30, level(3.0), errs=False)
+    assert kept
+    survey.sail(30, level(survey.memory.depth_m), errs=False)
     assert survey.memory.cells == kept
-    assert survey.sail(5, level(2.5)).status is SoundingStatus.OK, "it is believed again once its digits change"
+    believed = survey.sail(5, level(2.5))
+    assert believed.status is SoundingStatus.OK, "it is believed again once its digits change"
+    assert name_doubts(believed) == ()
 
 
 def test_a_boat_at_rest_hears_one_depth_for_long() -> None:
@@ -193,8 +206,9 @@ def test_a_sonar_that_raves_is_never_believed(steps: list[int]) -> None:
 )
 def test_nonsense_is_named_and_changes_no_obstacle(depth_m: float, available: bool, status: SoundingStatus) -> None:
     survey = Survey()
-    survey.sail(20, rising(0.3, 8.0))
+    survey.sail(26, rising(0.3, 5.0))
     marked = survey.memory.cells
+    assert marked
     survey.take(m.Depth(source_us=survey.now_us + STEP_US, depth_m=depth_m, available=available))
     assert survey.memory.status is status
     assert survey.memory.cells == marked
@@ -214,7 +228,9 @@ def test_an_echo_lost_over_water_that_became_shallow_is_lost_in_the_blind_zone()
     for survey, depth_m in ((shallow, 0.7), (deep, 3.0)):
         survey.sail(10, level(depth_m))
         survey.take(m.Depth(source_us=survey.now_us + STEP_US, available=False))
-    assert shallow.places() == [pytest.approx((shallow.x_m, 0.0), abs=0.4)]
+    sounded = [place for place, cell in zip(shallow.places(), shallow.memory.cells, strict=True) if cell.is_sounded]
+    assert sounded == [pytest.approx((shallow.x_m, 0.0), abs=0.4)]
+    assert max(x_m for x_m, y_m in shallow.places() if abs(y_m) < 0.3) > shallow.x_m + 0.4, "and the way on is closed"
     assert deep.memory.cells == ()
 
 
