@@ -25,6 +25,8 @@ pytestmark = [pytest.mark.browser, pytest.mark.timeout(180)]
 
 CLOCK = WallClock()
 STAYS_S = 1.0
+HOLD = "!document.querySelector('[data-drive=HOLD]').disabled"
+TAKE = "!document.querySelector('#drive-take').hidden"
 CLOCKS_US = 10_000  # the browser takes the time of day once, when a page is loaded
 # When the browser had what ends the hold [us of Unix time]; a script of the test is not on the way of a hand.
 STAMP = """(name) => addEventListener(name, (event) => {
@@ -42,11 +44,11 @@ class Link:
         self.port = 0
 
     @contextlib.asynccontextmanager
-    async def open(self) -> AsyncIterator[None]:
+    async def open(self) -> AsyncIterator[Link]:
         server = await asyncio.start_server(self._carry, "127.0.0.1", 0)
         self.port = server.sockets[0].getsockname()[1]
         try:
-            yield
+            yield self
         finally:
             server.close()
             for task in self._tasks:
@@ -103,36 +105,46 @@ async def cut(page: Any, link: Link) -> None:
     link.cut()
 
 
-@pytest.mark.parametrize("end", [release, blur, hide, close, cut])
-async def test_a_hand_that_is_gone_is_zero_thrust(
-    browser: Any, open_as: OpenAs, spawn: Spawn, config: Config, end: Callable[[Any, Link], Awaitable[None]]
-) -> None:
-    lookout, link = Lookout(await open_as("advisor"), await open_as("observer")), Link(config.dashboard.port)
+End = Callable[[Any, Link], Awaitable[None]]
+
+
+async def test_a_hand_that_is_gone_is_zero_thrust(browser: Any, open_as: OpenAs, spawn: Spawn, config: Config) -> None:
+    lookout = Lookout(await open_as("advisor"), await open_as("observer"))
     async with at_work(lookout.advise_forever(), lookout.keep_reports()), contextlib.AsyncExitStack() as stack:
         services = (*SERVICES, keys.STATION)
         await asyncio.gather(*(stack.enter_async_context(spawn(service, *SETS)) for service in services))
-        await stack.enter_async_context(link.open())
-        page = (await watch(browser, replace(config, dashboard=replace(config.dashboard, port=link.port)))).page
-        await page.wait_for_selector("[data-drive=HOLD]:enabled", timeout=WAIT_S * 1e3)  # the position is known
-        await arm_on_page(f"http://127.0.0.1:{config.dashboard.port}", config.bus)
-        await page.wait_for_selector(f"{MANUAL}:enabled", timeout=WAIT_S * 1e3)
-        await page.click(MANUAL)
-        await until(page, "document.querySelector('#drive').dataset.driving === 'true'")
-        await page.keyboard.down("w")
-        await lookout.until(lambda: lookout.is_thrusting, "thrust")
-        await asyncio.sleep(0.5)
-        assert lookout.is_thrusting, "for as long as it is held"
+        for end in (release, blur, hide, close, cut):
+            async with Link(config.dashboard.port).open() as link:
+                await hold_until(end, lookout, browser, link, config)
 
-        begun_us = CLOCK.now_us()
-        await end(page, link)
-        gone_us = begun_us if end in {close, cut} else int(await page.evaluate("window.goneUs"))
-        assert begun_us <= gone_us + CLOCKS_US
-        await lookout.until(lambda: not lookout.is_thrusting, "zero thrust")
-        await asyncio.sleep(STAYS_S)
-        after = [report for report in lookout.reports if report.sent_us > gone_us]
-        first_zero_us = next(report.sent_us for report in after if is_zero(report))
-        assert (first_zero_us - gone_us) * 1e-6 <= LET_GO_S
-        assert all(is_zero(report) for report in after if report.sent_us >= first_zero_us), "and stays so"
+
+async def hold_until(end: End, lookout: Lookout, browser: Any, link: Link, config: Config) -> None:
+    """Drive by hand on a page of its own, armed anew, until this ends it."""
+    page = (await watch(browser, replace(config, dashboard=replace(config.dashboard, port=link.port)))).page
+    await until(page, f"{TAKE} || {HOLD}")
+    if await page.evaluate(TAKE):  # the wheel is that of the hand before
+        await page.click("#drive-take")
+    await until(page, HOLD)  # the position is known
+    await arm_on_page(f"http://127.0.0.1:{config.dashboard.port}", config.bus)
+    await page.wait_for_selector(f"{MANUAL}:enabled", timeout=WAIT_S * 1e3)
+    await page.click(MANUAL)
+    await until(page, "document.querySelector('#drive').dataset.driving === 'true'")
+    await page.keyboard.down("w")
+    await lookout.until(lambda: lookout.is_thrusting, "thrust")
+    await asyncio.sleep(0.5)
+    assert lookout.is_thrusting, f"for as long as it is held: {end.__name__}"
+
+    begun_us = CLOCK.now_us()
+    await end(page, link)
+    gone_us = begun_us if end in {close, cut} else int(await page.evaluate("window.goneUs"))
+    assert begun_us <= gone_us + CLOCKS_US
+    await lookout.until(lambda: not lookout.is_thrusting, f"zero thrust: {end.__name__}")
+    await asyncio.sleep(STAYS_S)
+    after = [report for report in lookout.reports if report.sent_us > gone_us]
+    first_zero_us = next(report.sent_us for report in after if is_zero(report))
+    assert (first_zero_us - gone_us) * 1e-6 <= LET_GO_S, end.__name__
+    assert all(is_zero(report) for report in after if report.sent_us >= first_zero_us), f"and stays so: {end.__name__}"
+    await page.close()
 
 
 def is_zero(report: m.ThrustApplied) -> bool:
