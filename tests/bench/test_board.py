@@ -22,7 +22,7 @@ from paani_tools.bench.board.figures import is_stale
 from paani_tools.bench.board.host_counters import HostCounters
 from paani_tools.bench.board.poll import Poll
 
-pytestmark = [pytest.mark.integration, pytest.mark.timeout(150)]
+pytestmark = [pytest.mark.integration, pytest.mark.timeout(300)]
 
 ROWS_NOT_EVERYWHERE = {
     "memory of the control group median [MiB]": "memory",

@@ -18,7 +18,7 @@ from paani_tools.bench.eyes.command import Eyes, main, text
 from paani_tools.bench.eyes.stages import Row, Step, measure_steps, ratios, rows
 from tests.pictures import river
 
-pytestmark = [pytest.mark.integration, pytest.mark.timeout(150)]
+pytestmark = [pytest.mark.integration, pytest.mark.timeout(300)]
 
 
 def test_bench_eyes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -25,11 +25,11 @@ OPEN_WATER = 'seed = 5\n[world]\nkind = "lake"\nobstacles = false\nactors = fals
 LAP = OPEN_WATER + (
     "[weather]\nwind_mps = 1.0\n"
     "[route]\nclosed = true\n"
-    "waypoints_m = [[0.0, 0.0], [4.2, -2.8], [9.8, -3.5], [14.7, -2.1], [16.8, 2.1], [14.7, 6.3], [9.8, 7.7],"
-    " [4.2, 7.0], [0.0, 4.2]]\n"
+    "waypoints_m = [[0.0, 0.0], [2.9, -2.0], [6.9, -2.4], [10.3, -1.5], [11.8, 1.5], [10.3, 4.4], [6.9, 5.4],"
+    " [2.9, 4.9], [0.0, 2.9]]\n"
     "[task]\ntime_limit_s = 200.0\n"
-    '[[actors]]\nlook = "can"\nat_m = [9.8, -3.2]\n'
-    '[[actors]]\nlook = "rowboat"\nat_m = [9.8, 8.3]\nheading_deg = 10.0\n'
+    '[[actors]]\nlook = "can"\nat_m = [6.9, -2.2]\n'
+    '[[actors]]\nlook = "rowboat"\nat_m = [6.9, 5.8]\nheading_deg = 10.0\n'
 )
 AHEAD = OPEN_WATER + (
     "[route]\nwaypoints_m = [[0.0, 0.0], [16.0, 0.0]]\n[task]\ntime_limit_s = 90.0\n"
@@ -53,7 +53,7 @@ def test_w14_a_whole_lap_by_camera_round_what_lies_on_it(tmp_path: Path) -> None
     seeing, blind = (driven(tmp_path, LAP, policy, "profile=paani") for policy in (Policy.PAANI, Policy.BLIND))
     assert blind.collisions > 0
     assert (seeing.why, seeing.collisions) == (DriveOutcome.COMPLETED, 0)
-    assert seeing.progress_m >= seeing.goal_m > 45.0
+    assert seeing.progress_m >= seeing.goal_m > 30.0
     assert seeing.frames > 250
     assert {encounter.what for encounter in seeing.encounters} == {"actor_0", "actor_1"}
 
