@@ -57,16 +57,18 @@ async def faint_in_other_palettes(page: Any, palette: str) -> list[str]:
     found = []
     for tab in (await page.evaluate(TABS))[::-1]:
         await page.evaluate("(name) => document.querySelector(`[data-tab-of=${name}]`).click()", tab)
+        looked_at = {palette}
         for _ in range(PALETTES):
             await page.keyboard.press("d")
             current = await page.evaluate("document.documentElement.dataset.palette")
-            if current != palette:
+            if current not in looked_at:  # the one that the system chooses is one of the others
+                looked_at.add(current)
                 found += [f"{current}, {tab}: {one}" for one in await page.evaluate(FAINT)]
     return found
 
 
 async def test_every_palette_and_size_is_legible(
-    browser: Any, boat: Boat, open_as: OpenAs, spawn: Spawn, config: Config, tmp_path: Path
+    browser: Any, boat: Boat, open_as: OpenAs, spawn: Spawn, config: Config
 ) -> None:
     axe = AXE.read_text(encoding="utf-8")
     origin = f"http://127.0.0.1:{config.dashboard.port}"
@@ -88,7 +90,6 @@ async def test_every_palette_and_size_is_legible(
             for tab in (await page.evaluate(TABS))[::-1]:  # the one people drive from comes last
                 await page.evaluate("(name) => document.querySelector(`[data-tab-of=${name}]`).click()", tab)
                 await page.wait_for_timeout(700)
-                await page.screenshot(path=tmp_path / f"{palette}-{tab}.png")
                 assert await page.evaluate(SERIOUS) == [], (palette, tab)
                 assert await page.evaluate(SMALL_TEXT) == [], (palette, tab)
                 assert await page.evaluate(SMALL_TARGETS, least_px) == [], (palette, tab)
@@ -107,11 +108,14 @@ async def test_every_palette_and_size_is_legible(
 async def serious_in_every_palette(page: Any) -> list[str]:
     """What axe finds on what is open now."""
     await page.evaluate(AXE.read_text(encoding="utf-8"))
-    found = []
+    found, looked_at = [], set[str]()
     for _ in range(PALETTES):
         await page.keyboard.press("d")
-        await page.wait_for_timeout(300)
         current = await page.evaluate("document.documentElement.dataset.palette")
+        if current in looked_at:
+            continue
+        looked_at.add(current)
+        await page.wait_for_timeout(300)
         found += [f"{current}: {one}" for one in await page.evaluate(SERIOUS)]
     return found
 
