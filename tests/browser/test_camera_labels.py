@@ -46,22 +46,22 @@ def overlaps(first: list[float], second: list[float]) -> bool:
     )
 
 
-@pytest.mark.parametrize(
-    "places",
-    [
+async def test_no_label_hides_another(scripts_page: Any) -> None:
+    for places in (
         [(0.2, 0.5), (0.6, 0.5)],
         [(0.2, 0.5), (0.25, 0.5), (0.3, 0.52), (0.28, 0.48)],
         [(0.2, 0.02), (0.25, 0.02)],
-    ],
-    ids=["apart", "crowded", "at the top"],
-)
-async def test_no_label_hides_another(scripts_page: Any, places: list[tuple[float, float]]) -> None:
-    drawn, leaders = await scripts_page.evaluate(DRAW, [track(number, *place) for number, place in enumerate(places)])
-    above_or_in = sum(abs(top - 300 * place[1] + 8) < 12 for (_, top, _, _), place in zip(drawn, places, strict=True))
-    assert leaders == len(places) - above_or_in, "a label that stands elsewhere is joined to its box"
-    assert len(drawn) == len(places)
-    assert not any(overlaps(a, b) for index, a in enumerate(drawn) for b in drawn[:index]), drawn
-    assert all(0 <= x <= 400 - width and 0 <= y <= 300 - height for x, y, width, height in drawn)
+    ):
+        drawn, leaders = await scripts_page.evaluate(
+            DRAW, [track(number, *place) for number, place in enumerate(places)]
+        )
+        above_or_in = sum(
+            abs(top - 300 * place[1] + 8) < 12 for (_, top, _, _), place in zip(drawn, places, strict=True)
+        )
+        assert leaders == len(places) - above_or_in, "a label that stands elsewhere is joined to its box"
+        assert len(drawn) == len(places)
+        assert not any(overlaps(a, b) for index, a in enumerate(drawn) for b in drawn[:index]), drawn
+        assert all(0 <= x <= 400 - width and 0 <= y <= 300 - height for x, y, width, height in drawn)
 
 
 async def test_a_label_with_room_stands_above_its_box(scripts_page: Any) -> None:
@@ -70,15 +70,11 @@ async def test_a_label_with_room_stands_above_its_box(scripts_page: Any) -> None
     assert top + height <= 150
 
 
-@pytest.mark.parametrize(
-    ("width", "words"),
-    [(600, ["0.80 blocked", "0.80 blocked", "0.25 clear"]), (240, ["0.80", "0.80", "0.25"])],
-    ids=["room for words", "a small picture"],
-)
-async def test_no_corridors_label_hides_anothers(scripts_page: Any, width: int, words: list[str]) -> None:
-    texts, boxes = await scripts_page.evaluate(DRAW_CORRIDORS, [width, ADVISORY])
-    assert texts == words
-    assert not any(overlaps(a, b) for index, a in enumerate(boxes) for b in boxes[:index]), boxes
+async def test_no_corridors_label_hides_anothers(scripts_page: Any) -> None:
+    for width, words in ((600, ["0.80 blocked", "0.80 blocked", "0.25 clear"]), (240, ["0.80", "0.80", "0.25"])):
+        texts, boxes = await scripts_page.evaluate(DRAW_CORRIDORS, [width, ADVISORY])
+        assert texts == words
+        assert not any(overlaps(a, b) for index, a in enumerate(boxes) for b in boxes[:index]), boxes
 
 
 async def test_corridors_without_a_verdict_have_their_names(scripts_page: Any) -> None:

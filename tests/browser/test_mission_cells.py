@@ -34,14 +34,14 @@ def grid_with(column: int, row: int, what: m.Occupancy) -> dict[str, Any]:
     }  # fmt: skip
 
 
-@pytest.mark.parametrize(("column", "row"), [(0, 0), (3, 1), (5, 3)])
-async def test_a_leg_over_an_occupied_cell_is_marked_there(scripts_page: Any, column: int, row: int) -> None:
-    x_m, y_m = WEST_M + CELL_M * (column + 0.5), SOUTH_M + CELL_M * (row + 0.5)
-    over = [{"x_m": x_m - 20.0, "y_m": y_m}, {"x_m": x_m + 20.0, "y_m": y_m}]
-    beside = [{"x_m": each["x_m"], "y_m": each["y_m"] + CELL_M} for each in over]
-    occupied = grid_with(column, row, m.Occupancy.OCCUPIED)
-    ((at_x_m, at_y_m, text),) = await scripts_page.evaluate(MARKS, [over, occupied])
-    assert text == "leg 1, waypoint 1: the boat has seen something there"
-    assert (abs(at_x_m - x_m) <= CELL_M / 2, at_y_m) == (True, pytest.approx(y_m))
-    assert await scripts_page.evaluate(MARKS, [beside, occupied]) == []
-    assert await scripts_page.evaluate(MARKS, [over, grid_with(column, row, m.Occupancy.UNKNOWN)]) == []
+async def test_a_leg_over_an_occupied_cell_is_marked_there(scripts_page: Any) -> None:
+    for column, row in ((0, 0), (3, 1), (5, 3)):
+        x_m, y_m = WEST_M + CELL_M * (column + 0.5), SOUTH_M + CELL_M * (row + 0.5)
+        over = [{"x_m": x_m - 20.0, "y_m": y_m}, {"x_m": x_m + 20.0, "y_m": y_m}]
+        beside = [{"x_m": each["x_m"], "y_m": each["y_m"] + CELL_M} for each in over]
+        occupied = grid_with(column, row, m.Occupancy.OCCUPIED)
+        ((at_x_m, at_y_m, text),) = await scripts_page.evaluate(MARKS, [over, occupied])
+        assert text == "leg 1, waypoint 1: the boat has seen something there"
+        assert (abs(at_x_m - x_m) <= CELL_M / 2, at_y_m) == (True, pytest.approx(y_m))
+        assert await scripts_page.evaluate(MARKS, [beside, occupied]) == []
+        assert await scripts_page.evaluate(MARKS, [over, grid_with(column, row, m.Occupancy.UNKNOWN)]) == []

@@ -113,19 +113,14 @@ class Editor:
             pytest.fail(f"not {text!r} but {await self.page.inner_text('#editor-note')!r}")
 
 
-@pytest.mark.parametrize(
-    ("size", "marks"),
-    [
+async def test_what_is_too_much_is_said_at_once_and_nothing_else_is_looked_at(scripts_page: Any) -> None:
+    for size, marks in (
         ((10_000, 100), ["keep-out area 1: its edges cross"]),
         ((10_000, 101), ["10000 waypoints times 101 corners is more than 1000000"]),
         ((10_001, 3), ["more than 10000 waypoints"]),
         ((999, 1001), ["more than 1000 corners"]),
-    ],
-)
-async def test_what_is_too_much_is_said_at_once_and_nothing_else_is_looked_at(
-    scripts_page: Any, size: tuple[int, int], marks: list[str]
-) -> None:
-    assert (await scripts_page.evaluate(COUNTED, list(size)))[0] == marks
+    ):
+        assert (await scripts_page.evaluate(COUNTED, list(size)))[0] == marks
 
 
 async def test_a_point_is_drawn_where_the_hand_went_down_on_what_is_seen(
