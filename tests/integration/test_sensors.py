@@ -289,20 +289,21 @@ async def test_paani_sensors_shows_what_each_says_and_what_is_missing(
         await device(bus, SensorRole.IMU, lambda each: each.rate_hz > 90.0, 10.0)
         code, out, errors = await paani(private_sets, "sensors", "--for", "2.5")
         assert (code, errors) == (1, "")
-        gps, imu, heading, ais, lidar, lacks = out.split("\n\n")[1].splitlines()
+        gps, imu, heading, *others, lacks = out.split("\n\n")[1].splitlines()
         assert gps.startswith("gps     ok")
         assert "48.11" in gps
         assert "m/s^2" in imu
         assert heading.startswith("heading absent")
         assert "next try" in heading
-        assert [each.split()[:2] for each in (ais, lidar)] == [["ais", "off"], ["lidar", "off"]], "it lacks nothing"
+        wanted = [[role, "off"] for role in (SensorRole.AIS, SensorRole.LIDAR, SensorRole.SONAR)]
+        assert [each.split()[:2] for each in others] == wanted, "a boat without them lacks nothing"
         assert lacks == "missing: a heading: the boat stays stopped without one"
         terminals["heading"].plug()
         await device(bus, SensorRole.HEADING, has(SensorStatus.OK), 10.0)
         code, out, errors = await paani(private_sets, "sensors", "--for", "2.5", "--json")
         assert (code, errors) == (0, "")
         row = msgspec.json.decode(out.splitlines()[-1])
-        assert [each["status"] for each in row["devices"]] == ["ok", "ok", "ok", "off", "off"]
+        assert [each["status"] for each in row["devices"]] == ["ok", "ok", "ok", "off", "off", "off"]
         assert row["missing"] == ""
         assert row["imu"]["orientation_available"]
 
