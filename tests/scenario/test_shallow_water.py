@@ -15,11 +15,11 @@ from paani_sim.trials.policies import Policy, load_policy_config
 from paani_sim.trials.result import SHOAL, TrialResult
 from paani_sim.trials.run_trial import open_evidence_source
 from paani_sim.trials.scoring import score_drive
-from paani_sim.worlds import Fault, FaultKind
-from paani_sim.worlds.load import load_scenario
+from paani_sim.worlds import Fault, FaultKind, Scenario, Shoal, Task, load_world
+from paani_sim.worlds.route_frame import RouteFrame, cut_route
 
-SEED = 1
-pytestmark = pytest.mark.slow
+WAY_M, SHOAL_AT_M = 22.0, 12.0
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]  # three drives
 
 
 class Driven(NamedTuple):
@@ -33,8 +33,17 @@ class Driven(NamedTuple):
         return sum(each.kind == SHOAL for each in self.result.contacts)
 
 
+def shoal_ahead(*faults: Fault) -> Scenario:
+    """An empty lake, and a shoal in the lane."""
+    lake = dataclasses.replace(load_world("lake"), obstacles=(), actors=(), bottom_m=2.0)
+    section = cut_route(lake, 60.0, WAY_M)
+    x_m, y_m, _ = RouteFrame(section.route_m, closed=False).pose_at(SHOAL_AT_M, 0.3)
+    world = dataclasses.replace(section, shoals=(Shoal(x_m, y_m, 5.0, 0.05),))
+    return Scenario("shoal", world, seed=3, task=Task(WAY_M, 200.0), faults=faults)
+
+
 def driven(sonar: bool, *faults: Fault) -> Driven:
-    scenario = dataclasses.replace(load_scenario(f"random:shallows:{SEED}"), faults=faults)
+    scenario = shoal_ahead(*faults)
     config = load_policy_config(Policy.ORACLE, [f"plant.sensors.sonar={str(sonar).lower()}"])
     statuses = set[str]()
 
