@@ -131,11 +131,29 @@ def test_a_bottom_that_falls_closes_nothing_behind_the_boat() -> None:
     assert survey.sail(15, lambda x_m: 0.7 + 0.3 * x_m).cells == ()
 
 
-def test_the_way_on_is_closed_where_the_water_is_too_shallow_already_and_rises_still() -> None:
+@pytest.mark.parametrize("bottom", [rising(0.3, 2.0), level(0.4)], ids=["nearly shallow", "shallow"])
+def test_the_way_on_is_closed_where_the_water_is_shallow_already_or_as_good_as_that(bottom: Bottom) -> None:
     survey = Survey()
-    survey.sail(15, rising(0.3, 0.5))
+    survey.sail(16, bottom)
     expected = [x_m for (x_m, _), cell in zip(survey.places(), survey.memory.cells, strict=True) if not cell.is_sounded]
     assert max(expected) > survey.x_m + 0.4
+
+
+def test_the_foot_of_a_shoal_is_noticed_within_a_metre() -> None:
+    """What was level before it does not make the slope look gentle."""
+    survey = Survey()
+    survey.sail(33, lambda x_m: 1.54 - 0.45 * max(x_m - 3.0, 0.0))
+    assert survey.x_m < 4.0
+    assert min(x_m for x_m, y_m in survey.places() if abs(y_m) < 0.3) < 3.0 + (1.54 - LIMIT_M) / 0.45 + 0.4
+
+
+def test_a_boat_that_stands_keeps_what_it_expected_and_expects_nothing_new() -> None:
+    survey = Survey()
+    survey.sail(26, rising(0.3, 5.0))
+    marked = set(survey.places())
+    survey.sail(10, lambda x_m: rising(0.3, 5.0)(x_m) + 0.02 * (survey.steps % 3), speed_mps=0.0)
+    assert marked
+    assert set(survey.places()) == marked
 
 
 def test_memory_is_bounded_and_the_oldest_is_forgotten() -> None:
