@@ -8,6 +8,7 @@ Soundings only ever add obstacles. One is believed that can follow from the one 
 from each other; what is not believed marks nothing and frees nothing, and what was marked stays marked.
 """
 
+import itertools
 import math
 from collections.abc import Iterable
 
@@ -22,13 +23,14 @@ from paani_services.navigator.mapping.observation import ObservationMemory
 from paani_services.navigator.mapping.stamped_pose import StampedPose, interpolate_pose
 
 SHALLOW_CELL_M = 0.4  # two cells of the grid: no hull fits between two neighbours
-MAX_SHALLOW_CELLS = 400  # remembered, the oldest are forgotten first; as a shoal of 9 m across
+MAX_SHALLOW_CELLS = 1000  # remembered, the oldest are forgotten first; as a shoal of 14 m across
 EXPECTED_S = 120.0  # for which an expectation counts that no sounding refutes, as long as the planner remembers things
 EXPECTED_WITHIN_M = 2.5  # how far a slope is carried on: more than a boat at 0.6 m/s needs to turn or to stop
 # Of the soundings that say how the bottom goes on: the short way notices a shoal's foot, the long one a gentle rise.
 TREND_WAYS_M, TREND_S = (0.8, 1.6), 20.0
 TREND_SPACING_M = 0.08  # between two of them: a boat at rest learns no slope
 WALL_M = 2.0  # to either side of where the water is expected to be shallow, at most, and as far as that is away
+BEYOND_ROWS = 4  # of cells that are shallow beyond that: no way out of a tight place leads through a shoal
 MIN_AHEAD_M = 0.8  # of what is expected where the water is too shallow already and rises still: the hull's length
 JUMP_M, JUMP_FRAC = 0.3, 0.05  # by which soundings of one place may differ: waves, and five standard deviations
 MAX_SLOPE = 1.0  # sand and mud lie less steep than 45 degrees
@@ -160,9 +162,10 @@ def _mark(
 def _close(cells: dict[tuple[int, int], ShallowCell], here: Sounding, heading: tuple[float, float]) -> None:
     """Close the way ahead of a boat on shallow water: what it has not sounded may be shallower still."""
     east, north = heading
-    for side in range(-4, 5):
-        x_m = here.x_m + MIN_AHEAD_M * (east - 0.25 * side * north)
-        y_m = here.y_m + MIN_AHEAD_M * (north + 0.25 * side * east)
+    for row, side in itertools.product(range(BEYOND_ROWS), range(-2, 3)):
+        ahead_m, side_m = MIN_AHEAD_M + SHALLOW_CELL_M * row, SHALLOW_CELL_M * side
+        x_m = here.x_m + ahead_m * east - side_m * north
+        y_m = here.y_m + ahead_m * north + side_m * east
         _put(cells, ShallowCell(*_cell_at(x_m, y_m), here.stamp_us, False))
 
 
@@ -205,9 +208,12 @@ def _expected_places(
     away_m = max((depth_m - config.min_depth_m) / slope, MIN_AHEAD_M)
     if away_m > EXPECTED_WITHIN_M:
         return []
-    x_m, y_m = last.x_m + away_m * east, last.y_m + away_m * north
     sides_m = [0.1 * min(away_m, WALL_M) * k for k in range(-10, 11)]
-    return [(x_m - side_m * north, y_m + side_m * east) for side_m in sides_m]
+    return [
+        (last.x_m + ahead_m * east - side_m * north, last.y_m + ahead_m * north + side_m * east)
+        for ahead_m in (away_m + SHALLOW_CELL_M * row for row in range(BEYOND_ROWS))
+        for side_m in sides_m
+    ]
 
 
 def _take_lost_echo(memory: SoundingMemory, pose: StampedPose, config: PlannerConfig) -> SoundingMemory:

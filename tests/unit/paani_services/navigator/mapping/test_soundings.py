@@ -15,6 +15,7 @@ from paani.config import PlannerConfig
 from paani.messages import SoundingStatus
 from paani_services.navigator.mapping.observation import ObservationMemory, update_memory
 from paani_services.navigator.mapping.soundings import (
+    BEYOND_ROWS,
     EXPECTED_WITHIN_M,
     MAX_SHALLOW_CELLS,
     SHALLOW_CELL_M,
@@ -81,9 +82,11 @@ def test_shallow_water_is_expected_where_the_bottom_leads_to_before_the_boat_can
     assert survey.memory.status is SoundingStatus.OK
     places = survey.places()
     assert places, "no later than two metres before it, and a boat stops in 1.5 m"
-    assert all(abs(x_m - shallow_at_m) < 0.5 * EXPECTED_WITHIN_M for x_m, _ in places)
+    beyond_m = BEYOND_ROWS * SHALLOW_CELL_M
+    assert all(-0.5 * EXPECTED_WITHIN_M < x_m - shallow_at_m < 0.5 * EXPECTED_WITHIN_M + beyond_m for x_m, _ in places)
     ahead_m = [x_m for x_m, y_m in places if abs(y_m) < 0.3 and x_m > survey.x_m]
     assert min(ahead_m) < shallow_at_m + SHALLOW_CELL_M, "the way on is closed before it is shallow"
+    assert max(ahead_m) - min(ahead_m) > 1.0, "and so far beyond that no boat jumps it"
     assert {round(y_m, 1) for _, y_m in places} >= {-1.8, -1.0, -0.6, -0.2, 0.2, 0.6, 1.0, 1.8}, "and beside it"
 
 
