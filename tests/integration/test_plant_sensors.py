@@ -13,15 +13,17 @@ pytestmark = pytest.mark.integration
 
 
 async def test_what_a_boat_carries_is_on_the_bus(spawn: Spawn, open_as: OpenAs) -> None:
-    """Vessels by AIS as it is, ranges once it has a scanner."""
+    """Vessels by AIS as it is, ranges and depths once it has a scanner and a sounder."""
     bus = await open_as("observer")
-    scans, ais = bus.latest(keys.SCAN), bus.latest(keys.AIS)
-    async with spawn("plant", "plant.sensors.lidar=true"), asyncio.timeout(20.0):
-        scan = await scans.next()
+    scans, depths, ais = bus.latest(keys.SCAN), bus.latest(keys.DEPTH), bus.latest(keys.AIS)
+    async with spawn("plant", "plant.sensors.lidar=true", "plant.sensors.sonar=true"), asyncio.timeout(20.0):
+        scan, depth = await scans.next(), await depths.next()
         await ais.next()
     assert len(scan.ranges_m) == 360
-    received = scans.received
+    assert depth.available
+    assert depth.depth_m > 0.3
+    received = scans.received, depths.received
     async with spawn("plant"), asyncio.timeout(20.0):
         await ais.next()
         await ais.next()
-    assert scans.received == received
+    assert (scans.received, depths.received) == received

@@ -362,3 +362,18 @@ async def test_the_turns_of_a_scanner_on_a_serial_line_reach_the_bus(
         await device(bus, SensorRole.LIDAR, has(SensorStatus.OK), 5.0)
         scanner.unplug()
         await device(bus, SensorRole.LIDAR, has(SensorStatus.ABSENT), 12.0)
+
+
+async def test_soundings_on_a_serial_line_reach_the_bus(spawn: Spawn, open_as: OpenAs, tmp_path: Path) -> None:
+    """Below the transducer by the sentence; below the surface on the bus."""
+    bus, sounder, number = await open_as("observer"), Terminal(tmp_path / "sonar"), 0
+    sounder.plug()
+    depths = bus.latest(keys.DEPTH)
+    async with spawn("sensors", f'sensors.sonar.line="{sounder.address}"', "sensors.sonar.transducer_m=0.2"):
+        async with asyncio.timeout(15.0):
+            while depths.value is None:
+                number += 1
+                sounder.write(sentence(f"SDDPT,{3.0 + 0.01 * (number % 3):.2f},").encode())
+                await asyncio.sleep(0.2)
+        assert depths.value.depth_m == pytest.approx(3.21, abs=0.02)
+        await device(bus, SensorRole.SONAR, has(SensorStatus.OK), 5.0)
