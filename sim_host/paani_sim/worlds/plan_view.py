@@ -61,7 +61,7 @@ def draw_plan_view(scenario: Scenario, width_px: int, height_px: int, views: Seq
     for number, view in enumerate(views, start=1):
         canvas.draw_view(view, str(number))
     canvas.draw_scale()
-    canvas.draw_legend()
+    canvas.draw_legend(has_shoals=bool(world.shoals))
     return canvas.picture
 
 
@@ -135,9 +135,10 @@ class _MapCanvas:
         cv2.arrowedLine(self.picture, (32, base - 34), (32, base - 74), INK, 2, cv2.LINE_AA, 0, 0.3)
         _draw_text(self.picture, "N", (40, base - 58), 0.5, 1)
 
-    def draw_legend(self) -> None:
+    def draw_legend(self, *, has_shoals: bool) -> None:
         """What the colours mean, in the upper left corner."""
         rows = [*((str(kind), bgr) for kind, bgr in KINDS.items()), ("path", PATH), ("route", ROUTE)]
+        rows += [("shoal", SHOAL)] if has_shoals else []
         cv2.rectangle(self.picture, (8, 8), (108, 16 + 18 * len(rows)), (245, 245, 245), -1)
         for number, (name, bgr) in enumerate(rows):
             y = 20 + 18 * number

@@ -14,6 +14,7 @@ from paani_sim.worlds.curves import clearance_m
 from paani_sim.worlds.generate import DRAWN_WORLDS, draw_random_scenario
 from paani_sim.worlds.load import load_scenario
 from paani_sim.worlds.passability import PassabilityGrid, obstacle_distance_m
+from paani_sim.worlds.plan_view import SHOAL, draw_plan_view
 from paani_sim.worlds.route_frame import RouteFrame, cut_route
 from paani_sim.worlds.shallows import DEEP_M, MAX_SHOALS, add_shoals
 
@@ -80,3 +81,13 @@ def test_water_without_room_for_a_deep_way_past_gets_no_shoal() -> None:
     section, route = cut_route(canal, 20.0, 45.0), RouteFrame(canal.route_m, closed=canal.route_closed, first_m=20.0)
     grid = PassabilityGrid(section, route, 45.0)
     assert [add_shoals(section, route, 45.0, grid, np.random.default_rng(seed)) for seed in range(4)] == [None] * 4
+
+
+def test_the_plan_shows_shoals_and_what_their_colour_means() -> None:
+    plan = draw_plan_view(load_scenario("random:shallows:1"), 600, 400)
+    is_shoal = (plan == np.array(SHOAL, np.uint8)).all(axis=2)
+    legend = np.s_[8:150, 8:36]
+    assert is_shoal[legend].sum() > 100
+    assert is_shoal.sum() - is_shoal[legend].sum() > 100
+    plain = draw_plan_view(load_scenario("lake"), 600, 400)
+    assert not (plain[legend] == np.array(SHOAL, np.uint8)).all(axis=2).any()
