@@ -208,7 +208,7 @@ async def test_evidence_of_another_frame_is_not_drawn(browser: Any, boat: Boat, 
         assert overlay_state["mask_seq"] is None
         for x, y in ((0.3, 0.9), (0.7, 0.9), (BOX[0], 0.4), (0.5, 0.97)):
             assert is_colour(await page.evaluate(PIXEL, [x, y]), PICTURE_BGR[::-1]), (x, y)
-        assert "overlay left out" in await page.inner_text("#camera-note")
+        await until(page, "document.querySelector('#camera-note').textContent.includes('overlay left out')")
 
 
 async def test_stop_latches_and_outlives_the_operators_process(
