@@ -1,5 +1,8 @@
 """Messages of the plant: measurements and truth. `source_us` dates the step."""
 
+from collections.abc import Callable
+from typing import Any
+
 from paani import keys
 from paani import messages as m
 from paani.bus import Bus
@@ -7,6 +10,8 @@ from paani.config import PlantConfig
 from paani.messages.ais import MAX_VESSELS
 from paani_sim.plant import lidar
 from paani_sim.plant.plant import Plant
+
+Reading = Callable[[Plant, int], m.Message]
 
 
 def gps_message(plant: Plant, source_us: int) -> m.GpsFix:
@@ -84,31 +89,24 @@ def report_every(config: PlantConfig) -> int:
 
 
 class Measurements:
-    """Publishes fixes, IMU samples and the true pose, each at its rate."""
+    """Publishes what the sensors that the boat carries measure, and the true pose, each at its rate."""
 
     def __init__(self, bus: Bus, config: PlantConfig) -> None:
-        self._gps, self._imu = bus.publisher(keys.GPS), bus.publisher(keys.IMU)
-        self._ais, self._pose = bus.publisher(keys.AIS), bus.publisher(keys.TRUE_POSE)
-        self._scan, self._depth = bus.publisher(keys.SCAN), bus.publisher(keys.DEPTH)
-        rate_hz = 1.0 / config.step_s
-        self._gps_every = max(1, round(rate_hz / config.sensors.gps_rate_hz))
-        self._imu_every = max(1, round(rate_hz / config.sensors.imu_rate_hz))
-        self._ais_every = max(1, round(rate_hz / keys.AIS.rate_hz)) if config.sensors.ais else 0
-        self._scan_every = max(1, round(rate_hz / keys.SCAN.rate_hz)) if config.sensors.lidar else 0
-        self._depth_every = max(1, round(rate_hz / config.sensors.sonar_rate_hz)) if config.sensors.sonar else 0
-        self._pose_every = report_every(config)
+        sensors, rate_hz = config.sensors, 1.0 / config.step_s
+        wanted: list[tuple[keys.Topic[Any], float, Reading]] = [
+            (keys.IMU, sensors.imu_rate_hz, imu_message),
+            (keys.GPS, sensors.gps_rate_hz, gps_message),
+            (keys.AIS, keys.AIS.rate_hz if sensors.ais else 0.0, ais_message),
+            (keys.SCAN, keys.SCAN.rate_hz if sensors.lidar else 0.0, scan_message),
+            (keys.DEPTH, sensors.sonar_rate_hz if sensors.sonar else 0.0, depth_message),
+            (keys.TRUE_POSE, rate_hz / report_every(config), pose_message),
+        ]
+        self._carried = [
+            (max(1, round(rate_hz / hz)), bus.publisher(topic), read) for topic, hz, read in wanted if hz > 0.0
+        ]
 
     def publish(self, plant: Plant, source_us: int) -> None:
         """`source_us` dates the step that was just made."""
-        if plant.steps % self._imu_every == 0:
-            self._imu.put(imu_message(plant, source_us))
-        if plant.steps % self._gps_every == 0:
-            self._gps.put(gps_message(plant, source_us))
-        if self._ais_every and plant.steps % self._ais_every == 0:
-            self._ais.put(ais_message(plant, source_us))
-        if self._scan_every and plant.steps % self._scan_every == 0:
-            self._scan.put(scan_message(plant, source_us))
-        if self._depth_every and plant.steps % self._depth_every == 0:
-            self._depth.put(depth_message(plant, source_us))
-        if plant.steps % self._pose_every == 0:
-            self._pose.put(pose_message(plant, source_us))
+        for every, publisher, read in self._carried:
+            if plant.steps % every == 0:
+                publisher.put(read(plant, source_us))

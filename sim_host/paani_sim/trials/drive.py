@@ -6,6 +6,8 @@ perception; evidence reaches the board `perception_latency_s` after its picture 
 
 from __future__ import annotations
 
+from typing import TypeVar
+
 import cv2
 import msgspec
 
@@ -34,6 +36,7 @@ from paani_sim.trials.route_progress import RouteProgress
 from paani_sim.worlds import Scenario
 from paani_sim.worlds.faults import is_linked
 
+T = TypeVar("T", bound=m.Message)
 PERCEPTION_LATENCY_S = 0.10  # measured: capture_to_thrust of the live chain (`paani bench chain`), about 100 ms
 MAX_READY_S = 20.0
 MIN_READY_S = 2.0
@@ -174,23 +177,25 @@ class Drive:
     def _is_due(self, what: str) -> bool:
         return self.plant.steps % self._steps_between[what] == 0
 
+    def _send(self, topic: keys.Topic[T], message: T, *, linked: bool) -> T:
+        """Publish for the board, which hears it while its link holds; the message as sent."""
+        sent = self._bus.put(topic, message)
+        if linked:
+            self.autonomy.deliver(topic, sent)
+        return sent
+
     def _publish_measurements(self, now_us: int, *, linked: bool) -> None:
         if self._is_due("imu"):
             self._imu_samples.append(self._bus.put(keys.IMU, imu_message(self.plant, now_us)))
         if self._is_due("gps"):
             self._gps_fix = self._bus.put(keys.GPS, gps_message(self.plant, now_us))
-        if self.config.plant.sensors.ais and self._is_due("ais"):
-            heard = self._bus.put(keys.AIS, ais_message(self.plant, now_us))
-            if linked:
-                self.autonomy.deliver(keys.AIS, heard)
-        if self.config.plant.sensors.lidar and self._is_due("lidar"):
-            scan = self._bus.put(keys.SCAN, scan_message(self.plant, now_us))
-            if linked:
-                self.autonomy.deliver(keys.SCAN, scan)
-        if self.config.plant.sensors.sonar and self._is_due("depth"):
-            sounding = self._bus.put(keys.DEPTH, depth_message(self.plant, now_us))
-            if linked:
-                self.autonomy.deliver(keys.DEPTH, sounding)
+        sensors = self.config.plant.sensors
+        if sensors.ais and self._is_due("ais"):
+            self._send(keys.AIS, ais_message(self.plant, now_us), linked=linked)
+        if sensors.lidar and self._is_due("lidar"):
+            self._send(keys.SCAN, scan_message(self.plant, now_us), linked=linked)
+        if sensors.sonar and self._is_due("depth"):
+            self._send(keys.DEPTH, depth_message(self.plant, now_us), linked=linked)
 
     def _update_estimate(self, now_us: int, *, linked: bool) -> None:
         if not self._is_due("estimate"):
@@ -199,9 +204,7 @@ class Drive:
         self._imu_samples, self._gps_fix = [], None
         if self._bus.tap is not None:
             self._bus.put(keys.LOCAL_ODOMETRY, local)
-        self._odometry = self._bus.put(keys.ODOMETRY, odometry)
-        if linked:
-            self.autonomy.deliver(keys.ODOMETRY, self._odometry)
+        self._odometry = self._send(keys.ODOMETRY, odometry, linked=linked)
 
     def _update_evidence(self, now_us: int, *, linked: bool) -> None:
         if self._pending_evidence and now_us >= self._pending_evidence[0][0]:
@@ -240,19 +243,14 @@ class Drive:
         """Publish arming, the pulses of the vital processes, and the plant's clock."""
         if self._is_due("arming"):
             arming = m.Arming(source_us=now_us, armed=self.phase is DrivePhase.RUNNING)
-            arming = self._bus.put(keys.ARMING, arming)
-            self.adapter.receive_arming(arming, now_us)
-            if linked:
-                self.autonomy.deliver(keys.ARMING, arming)
+            self.adapter.receive_arming(self._send(keys.ARMING, arming, linked=linked), now_us)
         if self._is_due("pulse"):
             for service in self.config.plant.adapter.require_pulses:
                 if linked or service not in keys.BOARD_SERVICES:
                     self.adapter.receive_pulse(service, now_us)
         if self._is_due("report"):
             clock = m.SimTime(source_us=now_us, sim_us=self.plant.sim_us, stamp_us=now_us)
-            clock = self._bus.put(keys.SIM_TIME, clock)
-            if linked:
-                self.autonomy.deliver(keys.SIM_TIME, clock)
+            self._send(keys.SIM_TIME, clock, linked=linked)
 
     def _record_thrust_and_truth(self, now_us: int) -> None:
         """Record what the thrust adapter applies, and the true pose."""

@@ -87,11 +87,9 @@ def _load_file(path: Path) -> Scenario:
             world = dataclasses.replace(world, obstacles=(*world.obstacles, thing))
         else:
             world = dataclasses.replace(world, actors=(*world.actors, thing))
-    own = world
-    shoals = tuple(
-        build_shoal(part, own, f"{where}: depth.shoals[{number}]") for number, part in enumerate(file.depth.shoals)
-    )
-    world = dataclasses.replace(own, shoals=(*own.shoals, *shoals))
+    for number, shoal in enumerate(file.depth.shoals):
+        built = build_shoal(shoal, world, f"{where}: depth.shoals[{number}]")
+        world = dataclasses.replace(world, shoals=(*world.shoals, built))
     distance_m = file.task.distance_m or world.route_length_m
     scenario = Scenario(
         name=path.stem,

@@ -75,30 +75,21 @@ def _add_boat(spec: mujoco.MjSpec, world: World, vessel: Vessel) -> None:
     )
     boat.add_freejoint(name="boat_free")
     reach_m = 0.5 * hull.length_m - hull.radius_m
-    for name, side in (("hull_port", 0.5), ("hull_starboard", -0.5)):
+    parts = [("hull", hull.axis_z_m, BOAT_BIT, SOLID_BIT)]
+    if world.shoals:
+        parts.append(("keel", hull.radius_m - vessel.draught_m - vessel.buoyancy.equilibrium_z_m, 0, GROUND_BIT))
+    for name, side in (("port", 0.5), ("starboard", -0.5)):
         y_m = side * hull.spacing_m
-        boat.add_geom(
-            name=name,
-            type=_CAPSULE,
-            fromto=[-reach_m, y_m, hull.axis_z_m, reach_m, y_m, hull.axis_z_m],
-            size=[hull.radius_m, 0.0, 0.0],
-            contype=BOAT_BIT,
-            conaffinity=SOLID_BIT,
-            friction=[0.3, 0.005, 0.0001],
-            priority=1,  # a wet hull slides along whatever it touches
-            rgba=[0.9, 0.5, 0.1, 1.0],
-        )
-        if world.shoals:
-            keel_z_m = hull.radius_m - vessel.draught_m - vessel.buoyancy.equilibrium_z_m
+        for part, z_m, contype, conaffinity in parts:
             boat.add_geom(
-                name=name.replace("hull", "keel"),
+                name=f"{part}_{name}",
                 type=_CAPSULE,
-                fromto=[-reach_m, y_m, keel_z_m, reach_m, y_m, keel_z_m],
+                fromto=[-reach_m, y_m, z_m, reach_m, y_m, z_m],
                 size=[hull.radius_m, 0.0, 0.0],
-                contype=0,
-                conaffinity=GROUND_BIT,
+                contype=contype,
+                conaffinity=conaffinity,
                 friction=[0.3, 0.005, 0.0001],
-                priority=1,
+                priority=1,  # a wet hull slides along whatever it touches
                 rgba=[0.9, 0.5, 0.1, 1.0],
             )
     boat.add_site(name="imu", pos=[0.0, 0.0, 0.0])

@@ -21,12 +21,7 @@ def apply_fence(grid: OccupancyGrid, fence: Fence, offset_m: tuple[float, float]
     for area in fence:
         if area.keep is Keep.OUT:
             allowed &= ~_inside(grid, area, offset_m)
-    return grid._replace(
-        occupied=grid.occupied | ~allowed,
-        occluded=grid.occluded & allowed,
-        free=grid.free & allowed,
-        blind_zone=grid.blind_zone & allowed,
-    )
+    return grid.with_occupied(~allowed)._replace(occluded=grid.occluded & allowed)
 
 
 def _inside(grid: OccupancyGrid, area: FenceArea, offset_m: tuple[float, float]) -> Bools:

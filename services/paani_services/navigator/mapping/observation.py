@@ -129,7 +129,8 @@ def update_memory(
     """
     if odometry is not None and odometry.healthy:
         memory = _add_pose(memory, odometry, config)
-    memory = msgspec.structs.replace(memory, scans=add_scan(memory.scans, scan, memory.poses, config))
+    if scan is not None:
+        memory = msgspec.structs.replace(memory, scans=add_scan(memory.scans, scan, memory.poses, config))
     if evidence is None or (evidence.frame_epoch, evidence.frame_seq) == memory.frame_id:
         return memory
     memory = msgspec.structs.replace(memory, frame_id=(evidence.frame_epoch, evidence.frame_seq))

@@ -61,6 +61,18 @@ class OccupancyGrid(NamedTuple):
         """Nothing is known of the cell."""
         return ~(self.occupied | self.free | self.blind_zone)
 
+    def with_occupied(self, cells: Bools) -> "OccupancyGrid":
+        """The grid with these cells occupied, whatever else they were taken for."""
+        return self._replace(
+            occupied=self.occupied | cells, free=self.free & ~cells, blind_zone=self.blind_zone & ~cells
+        )
+
+    def locate(self, east_m: F64, north_m: F64) -> tuple[I64, I64, Bools]:
+        """Row and column of the cell of each place, and whether that is on the grid [places]."""
+        column = np.floor((east_m - self.west_m) / CELL_M).astype(np.int64)
+        row = np.floor((north_m - self.south_m) / CELL_M).astype(np.int64)
+        return row, column, (column >= 0) & (column < GRID_CELLS) & (row >= 0) & (row < GRID_CELLS)
+
 
 def build_occupancy_grid(
     observations: tuple[Observation, ...],

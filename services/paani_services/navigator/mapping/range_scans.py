@@ -42,14 +42,14 @@ class Scan(msgspec.Struct, frozen=True, array_like=True, cache_hash=True):
 
 
 def add_scan(
-    scans: tuple[Scan, ...], message: RangeScan | None, poses: tuple[StampedPose, ...], config: PlannerConfig
+    scans: tuple[Scan, ...], message: RangeScan, poses: tuple[StampedPose, ...], config: PlannerConfig
 ) -> tuple[Scan, ...]:
     """Add the newest scan, if it is a new one and the boat's pose at its time is known; forget what is of no use."""
-    if message is None or config.scan_max_age_s == 0.0:
-        return scans
     newest_us = scans[-1].stamp_us if scans else -SPACING_US
+    if config.scan_max_age_s == 0.0 or message.source_us - newest_us < SPACING_US:
+        return scans
     pose = interpolate_pose(poses, message.source_us, config.max_pose_gap_s)
-    if pose is None or message.source_us - newest_us < SPACING_US:
+    if pose is None:
         return scans
     cos, sin = portable.cos(pose.yaw_rad), portable.sin(pose.yaw_rad)
     scan = Scan(

@@ -13,8 +13,7 @@ from paani.arrays import F64, I64
 from paani.config import PlannerConfig
 from paani.messages import Label
 from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle, measurements_of_end
-from paani_services.navigator.mapping.observed_cells import CELL_M
-from paani_services.navigator.mapping.occupancy_grid import GRID_CELLS, NO_BOXES, OccupancyGrid
+from paani_services.navigator.mapping.occupancy_grid import NO_BOXES, OccupancyGrid
 from paani_services.navigator.mapping.range_scans import (
     MAX_SCANS,
     RANGE_STD_M,
@@ -71,14 +70,10 @@ def scan_water(scans: tuple[Scan, ...], now_us: int, config: PlannerConfig) -> S
 def mark_echoes(grid: OccupancyGrid, water: ScannedWater) -> OccupancyGrid:
     """The grid with the cells of standing echoes occupied, whatever else they were taken for."""
     east_m, north_m = (each[water.standing] for each in find_echoes(water.scan))
-    column = np.floor((east_m - grid.west_m) / CELL_M).astype(np.int64)
-    row = np.floor((north_m - grid.south_m) / CELL_M).astype(np.int64)
-    inside = (column >= 0) & (column < GRID_CELLS) & (row >= 0) & (row < GRID_CELLS)
+    row, column, is_on_grid = grid.locate(east_m, north_m)
     echoes = np.zeros_like(grid.occupied)
-    echoes[row[inside], column[inside]] = True
-    return grid._replace(
-        occupied=grid.occupied | echoes, free=grid.free & ~echoes, blind_zone=grid.blind_zone & ~echoes
-    )
+    echoes[row[is_on_grid], column[is_on_grid]] = True
+    return grid.with_occupied(echoes)
 
 
 def _track_segments(scans: tuple[Scan, ...]) -> list[list[PositionMeasurement]]:

@@ -30,6 +30,4 @@ def apply_shallow_cells(grid: OccupancyGrid, cells: CellNumbers) -> OccupancyGri
     for column, row in cells:
         left, low = SPLIT * column - west, SPLIT * row - south
         shallow[max(low, 0) : max(low + SPLIT, 0), max(left, 0) : max(left + SPLIT, 0)] = True
-    return grid._replace(
-        occupied=grid.occupied | shallow, free=grid.free & ~shallow, blind_zone=grid.blind_zone & ~shallow
-    )
+    return grid.with_occupied(shallow)

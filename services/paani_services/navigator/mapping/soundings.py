@@ -138,7 +138,7 @@ def _mark(
 
     A boat that stands expects nothing new: the noise of its soundings would turn the slope to and fro.
     """
-    cells = {(cell.column, cell.row): cell for cell in memory.cells}
+    cells = _by_place(memory.cells)
     for each in believed:
         if each.depth_m < config.min_depth_m:
             _put(cells, ShallowCell(*_cell_at(each.x_m, each.y_m), each.stamp_us, True))
@@ -148,14 +148,13 @@ def _mark(
     bottoms = _fit_bottoms(memory.recent)
     if bottoms:
         kept = [each for each in cells.values() if not all(_is_refuted(each, fit, last, config) for fit in bottoms)]
-        cells = {(cell.column, cell.row): cell for cell in kept}
+        cells = _by_place(kept)
+    heading = portable.cos(yaw_rad), portable.sin(yaw_rad)
     for bottom in bottoms if has_moved else []:
-        for x_m, y_m in _expected_places(bottom, last, yaw_rad, config):
+        for x_m, y_m in _expected_places(bottom, last, heading, config):
             _put(cells, ShallowCell(*_cell_at(x_m, y_m), last.stamp_us, False))
-    if last.depth_m < config.min_depth_m:
-        heading = portable.cos(yaw_rad), portable.sin(yaw_rad)
-        if not any(_falls_along(fit, heading) for fit in bottoms):
-            _close(cells, last, heading)
+    if last.depth_m < config.min_depth_m and not any(_falls_along(fit, heading) for fit in bottoms):
+        _close(cells, last, heading)
     return msgspec.structs.replace(memory, cells=_keep_cells(cells.values(), last.stamp_us))
 
 
@@ -175,7 +174,7 @@ def _falls_along(bottom: Bottom, heading: tuple[float, float]) -> bool:
 
 
 def _lies_at(cell: ShallowCell, sounding: Sounding) -> bool:
-    x_m, y_m = _middle_m(cell, 0.0, 0.0)
+    x_m, y_m = _middle_m(cell)
     return math.hypot(x_m - sounding.x_m, y_m - sounding.y_m) < SHALLOW_CELL_M
 
 
@@ -190,7 +189,7 @@ def _fit_bottoms(recent: tuple[Sounding, ...]) -> list[Bottom]:
 
 def _is_refuted(cell: ShallowCell, bottom: Bottom, last: Sounding, config: PlannerConfig) -> bool:
     """Whether a place that was only expected to be shallow is deep, as the bottom goes on by now."""
-    x_m, y_m = _middle_m(cell, 0.0, 0.0)
+    x_m, y_m = _middle_m(cell)
     if cell.is_sounded or math.hypot(x_m - last.x_m, y_m - last.y_m) > EXPECTED_WITHIN_M:
         return False
     depth_m, std_m = bottom.depth_at(x_m, y_m)
@@ -198,11 +197,11 @@ def _is_refuted(cell: ShallowCell, bottom: Bottom, last: Sounding, config: Plann
 
 
 def _expected_places(
-    bottom: Bottom, last: Sounding, yaw_rad: float, config: PlannerConfig
+    bottom: Bottom, last: Sounding, heading: tuple[float, float], config: PlannerConfig
 ) -> list[tuple[float, float]]:
     """Where the water will be shallow if the bottom goes on as it rose, ahead of the boat or beside it."""
     slope, east, north = bottom.upward
-    if slope == 0.0 or _falls_along(bottom, (portable.cos(yaw_rad), portable.sin(yaw_rad))):
+    if slope == 0.0 or _falls_along(bottom, heading):
         return []
     depth_m, _ = bottom.depth_at(last.x_m, last.y_m)
     away_m = max((depth_m - config.min_depth_m) / slope, MIN_AHEAD_M)
@@ -223,7 +222,7 @@ def _take_lost_echo(memory: SoundingMemory, pose: StampedPose, config: PlannerCo
     lost_s = math.inf if last is None else (memory.stamp_us - last.stamp_us) * 1e-6
     if last is None or not 0.0 <= lost_s <= TREND_S or last.depth_m > LOST_DEPTHS * config.min_depth_m:
         return memory
-    cells = {(cell.column, cell.row): cell for cell in memory.cells}
+    cells = _by_place(memory.cells)
     _put(cells, ShallowCell(*_cell_at(pose.x_m, pose.y_m), memory.stamp_us, True))
     here = Sounding(memory.stamp_us, pose.x_m, pose.y_m, last.depth_m)
     _close(cells, here, (portable.cos(pose.yaw_rad), portable.sin(pose.yaw_rad)))
@@ -265,16 +264,20 @@ def _carry_over(
     """Where dead reckoning begins anew, places go on by the map, and the trend ends."""
     if memory.reckoned_us and boat.poses[0].stamp_us > memory.reckoned_us:
         east_m, north_m = memory.offset_m
-        moved = [
-            msgspec.structs.replace(cell, column=column, row=row)
-            for cell in memory.cells
-            for column, row in [_cell_at(*_middle_m(cell, east_m, north_m))]
-        ]
+        moved = []
+        for cell in memory.cells:
+            x_m, y_m = _middle_m(cell)
+            column, row = _cell_at(x_m + east_m, y_m + north_m)
+            moved.append(msgspec.structs.replace(cell, column=column, row=row))
         memory = msgspec.structs.replace(memory, cells=tuple(moved), recent=(), doubted=(), repeated=None, repeats=0)
     offset_m = memory.offset_m
     if odometry is not None and odometry.source_us == here.stamp_us:
         offset_m = odometry.x_m - here.x_m, odometry.y_m - here.y_m
     return msgspec.structs.replace(memory, offset_m=offset_m, reckoned_us=here.stamp_us)
+
+
+def _by_place(cells: Iterable[ShallowCell]) -> dict[tuple[int, int], ShallowCell]:
+    return {(cell.column, cell.row): cell for cell in cells}
 
 
 def _put(cells: dict[tuple[int, int], ShallowCell], cell: ShallowCell) -> None:
@@ -293,8 +296,8 @@ def _cell_at(x_m: float, y_m: float) -> tuple[int, int]:
     return math.floor(x_m / SHALLOW_CELL_M), math.floor(y_m / SHALLOW_CELL_M)
 
 
-def _middle_m(cell: ShallowCell, east_m: float, north_m: float) -> tuple[float, float]:
-    return (cell.column + 0.5) * SHALLOW_CELL_M + east_m, (cell.row + 0.5) * SHALLOW_CELL_M + north_m
+def _middle_m(cell: ShallowCell) -> tuple[float, float]:
+    return (cell.column + 0.5) * SHALLOW_CELL_M, (cell.row + 0.5) * SHALLOW_CELL_M
 
 
 def _way_m(one: Sounding, other: Sounding) -> float:

@@ -1,12 +1,10 @@
 """The water around a position: the occupancy grid, and what moves on it. Pure."""
 
-import numpy as np
-
 from paani.config import PlannerConfig
 from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle, find_dynamic_obstacles
 from paani_services.navigator.mapping.observation import Observation
-from paani_services.navigator.mapping.observed_cells import CELL_M, Camera
-from paani_services.navigator.mapping.occupancy_grid import GRID_CELLS, BoxIds, OccupancyGrid, build_occupancy_grid
+from paani_services.navigator.mapping.observed_cells import Camera
+from paani_services.navigator.mapping.occupancy_grid import BoxIds, OccupancyGrid, build_occupancy_grid
 from paani_services.navigator.mapping.range_scans import Scan
 from paani_services.navigator.mapping.scanned_obstacles import mark_echoes, scan_water
 
@@ -37,7 +35,5 @@ def is_refuted(obstacle: DynamicObstacle, grid: OccupancyGrid) -> bool:
     """
     if obstacle.age_s < MIN_UNSEEN_S:
         return False
-    column = np.floor((obstacle.east_m - grid.west_m) / CELL_M).astype(np.int64)
-    row = np.floor((obstacle.north_m - grid.south_m) / CELL_M).astype(np.int64)
-    on_grid = (column >= 0) & (column < GRID_CELLS) & (row >= 0) & (row < GRID_CELLS)
-    return bool(on_grid.all() and grid.free[row, column].all())
+    row, column, is_on_grid = grid.locate(obstacle.east_m, obstacle.north_m)
+    return bool(is_on_grid.all() and grid.free[row, column].all())

@@ -68,6 +68,7 @@ def test_shoals_lie_in_the_lane_and_a_deep_way_leads_past_them() -> None:
     assert sum(min(each.top_m for each in one.world.shoals) < DRAUGHT_M for one in scenarios()) == SEEDS
 
 
+@pytest.mark.slow
 def test_a_seed_is_always_the_same_water_and_another_is_another() -> None:
     again = draw_random_scenario("shallows", 1)
     assert again.world.shoals == scenarios()[0].world.shoals
@@ -76,6 +77,7 @@ def test_a_seed_is_always_the_same_water_and_another_is_another() -> None:
     assert "shallows" in DRAWN_WORLDS
 
 
+@pytest.mark.slow
 def test_water_without_room_for_a_deep_way_past_gets_no_shoal() -> None:
     canal = load_world("canal")
     section, route = cut_route(canal, 20.0, 45.0), RouteFrame(canal.route_m, closed=canal.route_closed, first_m=20.0)

@@ -136,6 +136,7 @@ def test_the_thrust_in_a_step_is_its_mean_and_changes_when_the_plant_says(rich: 
     assert found.thrust[int(step) - 1] == pytest.approx([0.0, 0.0])
 
 
+@pytest.mark.slow
 def test_a_drive_by_radio_is_refused_because_its_thrust_is_unknown(rich: Messages) -> None:
     taken = msgspec.structs.replace(rich.applied[600], left=0.0, right=0.0, zero_cause=ZeroCause.RECEIVER)
     with pytest.raises(UserError, match="the radio receiver drove, 30 s into the drive"):

@@ -159,6 +159,7 @@ def test_a_boat_that_stands_keeps_what_it_expected_and_expects_nothing_new() -> 
     assert set(survey.places()) == marked
 
 
+@pytest.mark.slow
 def test_memory_is_bounded_and_the_oldest_is_forgotten() -> None:
     survey = Survey()
     survey.sail(1200, level(0.4), speed_mps=1.5)
