@@ -44,6 +44,7 @@ def test_a_miniature_keeps_its_masks_r10(tmp_path: Path) -> None:
     assert mask[[50, 110, 150, 300], 0].tolist() == [2, 255, 1, 0]
 
 
+@pytest.mark.slow
 def test_whole_sequences_stay_together(tmp_path: Path) -> None:
     manifest, leaks = prepare_mastr1325(mastr1325(tmp_path / "raw", (6, 6, 6, 6, 6, 6)), tmp_path / "out")
     sides: dict[str, set[str]] = {}

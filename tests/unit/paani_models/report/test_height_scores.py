@@ -86,6 +86,7 @@ def any_height(rows: list[HeightRow], detector: str) -> HeightRow:
     return next(r for r in rows if r.detector == detector and (r.low_px, r.high_px) == ANY_HEIGHT_PX)
 
 
+@pytest.mark.slow
 def test_over_all_heights_the_figures_are_those_of_the_manifest() -> None:
     pictures, runs = results()
     row = any_height(score_heights(pictures, runs), "noisy")
@@ -101,6 +102,7 @@ def test_over_all_heights_the_figures_are_those_of_the_manifest() -> None:
         assert each.low < each.value < each.high
 
 
+@pytest.mark.slow
 def test_who_finds_nothing_has_no_precision_and_who_does_not_know_a_class_no_row() -> None:
     rows = score_heights(*results())
     assert {row.detector for row in rows} == {"noisy", "blind"}

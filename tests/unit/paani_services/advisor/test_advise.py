@@ -263,6 +263,7 @@ def test_any_evidence_gives_an_advisory_that_survives_the_wire(frames: list[tupl
     st.floats(0.0, 0.6),
     st.floats(0.0, 0.1),
 )
+@pytest.mark.slow
 def test_more_evidence_of_danger_never_lowers_a_risk(detections: list[m.Detection], risk: float, more: float) -> None:
     """J4: risk is monotone in the water's part and in the number of boxes."""
 

@@ -331,6 +331,7 @@ def test_no_turn_into_a_lane_without_water(non_water: float) -> None:
 
 @settings(max_examples=300, deadline=None)
 @given(scenes(6), st.sampled_from((PAANI, PAPER, CALIBRATED)))
+@pytest.mark.slow
 def test_only_a_turn_to_a_blocked_side_is_to_look(given_scene: Scene, config: Config) -> None:
     """Every other advice is to pass; a search is advised with NO_SIDE_FOR_LONG alone."""
     decision = given_scene.decided(config)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -51,6 +52,7 @@ class Watch:
 
 @settings(max_examples=6, deadline=None)
 @given(st.integers(1_000_000, 3 * 3600 * 1_000_000), st.booleans(), st.integers(0, 2))
+@pytest.mark.slow
 def test_the_boat_goes_on_after_its_clock_was_set_back(by_us: int, was_enclosed: bool, dated_before: int) -> None:
     """Whether it had a way before or not, and whatever was still dated by the clock of before."""
     watch = Watch()

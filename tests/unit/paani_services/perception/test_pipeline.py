@@ -37,6 +37,7 @@ def jpeg(picture: np.ndarray) -> bytes:
     return cv2.imencode(".jpg", picture)[1].tobytes()
 
 
+@pytest.mark.slow
 def test_b5_evidence_of_a_picture() -> None:
     """B4, B5, B7: dimensions, source sequence, stamps, detections, lanes, timing, freshness; learned and eligible."""
     evidence, mask = perceiver().perceive(jpeg(river()), HEADER, 0.12)

@@ -132,6 +132,7 @@ def causes_of(config: PerceptionConfig, *pictures: U8, epochs: tuple[int, ...] =
     return [evidence.cause for evidence, _ in perceive(config, *pictures, epochs=epochs)]
 
 
+@pytest.mark.slow
 def test_the_pipeline_names_the_view_and_gives_no_mask() -> None:
     """A limit that no picture meets makes any view one without water."""
     quality = msgspec.structs.replace(CONFIG.image_quality, min_water=1.0)
@@ -141,6 +142,7 @@ def test_the_pipeline_names_the_view_and_gives_no_mask() -> None:
     assert evidence.center.non_water == 1.0
 
 
+@pytest.mark.slow
 def test_a_doubted_picture_without_a_swimmer_stays_refused_and_one_that_repeats_itself_is_frozen() -> None:
     causes = causes_of(msgspec.structs.replace(CONFIG, image_quality=DOUBTING), *[river()] * 4)
     assert causes == [UNFIT, UNFIT, UnusableCause.FROZEN, UnusableCause.FROZEN]

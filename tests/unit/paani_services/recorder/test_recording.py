@@ -186,6 +186,7 @@ def small_files() -> Iterator[None]:
         signal.signal(signal.SIGXFSZ, handler)
 
 
+@pytest.mark.slow
 def test_a_write_that_fails_is_counted_and_tried_again(tmp_path: Path) -> None:
     recording = Recording(settings(tmp_path, flush_s=0.1), describe_system(Config()), TOPICS)
     with small_files():

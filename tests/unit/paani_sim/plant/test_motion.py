@@ -116,6 +116,7 @@ def test_moving_actor_hits_a_drifting_boat(open_plant: OpenPlant) -> None:
 
 
 @pytest.mark.parametrize("vessel", ["paper", "otter"])
+@pytest.mark.slow
 def test_boat_inside_a_solid_is_thrown_out_not_to_infinity(open_plant: OpenPlant, vessel: str) -> None:
     """The worst of contacts, athwart the middle of every thing on the lake: thrown out, then slowed by the water."""
     plant = open_plant(load_world("lake"), PlantConfig(vessel=vessel))

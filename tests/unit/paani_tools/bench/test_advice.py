@@ -156,6 +156,7 @@ def test_a_centre_that_is_occupied_by_eye_is_no_open_water(
     assert "open_water" not in json.loads(out.read_bytes())["pictures"][0]["counts"]
 
 
+@pytest.mark.slow
 def test_a_mask_that_is_mistaken_by_eye_says_nothing(
     data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import asyncio
 
+import pytest
+
 from paani_tools.bench.deck.slow_link import slow_link
 
 DELAY_S = 0.1
 
 
+@pytest.mark.slow
 async def test_bytes_arrive_later_and_in_their_order() -> None:
     loop = asyncio.get_running_loop()
 

@@ -179,6 +179,7 @@ def test_a_way_out_is_kept_though_the_velocity_is_measured_now_to_one_side_and_n
     surge_mps=st.floats(0.0, 0.6),
     escape_mps=st.sampled_from([0.6, 0.9]),
 )
+@pytest.mark.slow
 def test_nothing_else_is_left_faster_than_was_asked_for(
     bearing_rad: float, speed_mps: float, aside_m: float, label: Label, surge_mps: float, escape_mps: float
 ) -> None:

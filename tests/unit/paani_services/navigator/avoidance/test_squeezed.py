@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -64,6 +65,7 @@ def vessel_out_of_sight(away_m: float, bearing_rad: float, course_rad: float, ag
     vessel=st.tuples(st.floats(1.5, 4.0), st.floats(-3.1, 3.1), st.floats(-3.1, 3.1), st.floats(2.0, 12.0)),
     surge_mps=st.floats(0.0, 0.6),
 )
+@pytest.mark.slow
 def test_no_last_way_out_leads_into_what_is_there(
     bar: tuple[float, float, float], vessel: tuple[float, float, float, float], surge_mps: float
 ) -> None:

@@ -124,6 +124,7 @@ def test_unusable_odometry_is_not_dead_reckoned(changes: dict[str, float]) -> No
     assert update_memory(memory, odometry(START_US + 50_000, AT_REST, **changes), None, PLANNER) == memory
 
 
+@pytest.mark.slow
 def test_every_picture_in_use_is_projected_once_and_few_others_are_kept() -> None:
     """At 30 Hz. Cells of pictures that are out of use are megabytes that come and go with what is seen."""
     memory, period_us = ObservationMemory(), 33_333
