@@ -112,14 +112,15 @@ def _encounters(
     config: NavigatorConfig,
     before: Prediction | None,
 ) -> list[Encounter]:
-    """Those with the obstacles that the plan was made for."""
+    """Those with the obstacles that the plan was made for. What has no name, as an echo, is classified each time."""
     is_old = has_passed(planner.planned_us, PLAN_MAX_AGE_US, now_us)
     targets = planner.basis.targets if planner.basis is not None and not is_old else ()
     scanned = scan_water(planner.memory.scans, now_us, config.planner)
     met = scanned.obstacles if scanned is not None and not is_old else ()
     if not planner.obstacle_track_ids and not targets and not met:
         return []
-    classes = {(each.track_id, each.mmsi): each.encounter for each in before.obstacles} if before is not None else {}
+    named = [each for each in before.obstacles if each.track_id or each.mmsi] if before is not None else []
+    classes = {(each.track_id, each.mmsi): each.encounter for each in named}
     seen = find_dynamic_obstacles(planner.memory.observations, now_us, camera, config.planner)
     unseen = predict_unseen_targets(targets, seen, boat[:3], camera.calibration)
     return [

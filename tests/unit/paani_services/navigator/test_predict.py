@@ -18,7 +18,18 @@ from paani_services.navigator.mapping.water_map import map_water
 from paani_services.navigator.navigate import NavigatorState
 from paani_services.navigator.predict import predict
 from paani_sim.eye.camera import BoatPose
-from tests.synthetic_water import AT_REST, CAMERA, CONFIG, PLANNER, evidence, explain_motion, odometry
+from tests.synthetic_scans import SCAN_US, scan_from
+from tests.synthetic_water import (
+    AT_REST,
+    CAMERA,
+    CONFIG,
+    EMPTY_MEMORY,
+    PLANNER,
+    START_US,
+    evidence,
+    explain_motion,
+    odometry,
+)
 from tests.unit.paani_services.navigator.mapping.test_track_identity import person_of, watch
 
 NAVIGATOR = replace(CONFIG.navigator, planner=PLANNER)
@@ -69,6 +80,26 @@ def test_encounters_are_told_with_their_closest_point_and_keep_their_class() -> 
         side = before.value.removeprefix("crossing_")
         number = person_of(tracks).id
         assert kept.courtesy == f"Give way: person #{number} crossing from {side}, waiting until it is past"
+
+
+def test_what_a_scanner_meets_has_no_name_by_which_it_could_keep_a_class() -> None:
+    """A hull from port: the class of another echo of before is not its own."""
+    memory, now_us = EMPTY_MEMORY, START_US
+    for number in range(16):
+        now_us = START_US + number * SCAN_US
+        north_m = 6.0 - 0.8 * number * SCAN_US * 1e-6
+        memory = scan_from(now_us, AT_REST, ((4.0, north_m, 5.0, north_m + 1.0),), memory)
+    state = NavigatorState(planner_state=PlannerState(memory, planned_us=now_us))
+
+    def scanned(before: m.Prediction | None) -> m.Prediction:
+        return predict(state, AHEAD, odometry(now_us, AT_REST), None, now_us, CAMERA, NAVIGATOR, before)
+
+    first = scanned(None)
+    (met,) = first.obstacles
+    assert (met.track_id, met.mmsi) == (0, 0)
+    assert met.encounter is not m.EncounterClass.OVERTAKING
+    other = replace(met, encounter=m.EncounterClass.OVERTAKING)
+    assert scanned(replace(first, obstacles=(other,))).obstacles == first.obstacles
 
 
 @pytest.mark.parametrize(
