@@ -91,28 +91,48 @@ async def phone(
         await context.close()
 
 
-async def test_one_finger_holds_the_stick_and_no_other_moves_it_or_lets_it_go(
-    phone: tuple[Any, Fingers, Orders],
-) -> None:
-    page, fingers, orders = phone
+class LateHand(Exception):
+    """The page was not run for so long that the hand was taken for gone, as it has to be."""
+
+
+async def until_driven(orders: Orders, stick: tuple[float, float]) -> None:
+    await orders.until(lambda found: found.stick == stick or found.mode is not DriveMode.MANUAL)
+    if orders.mode is not DriveMode.MANUAL:
+        raise LateHand
+
+
+async def hold_with_a_second_finger(page: Any, fingers: Fingers, orders: Orders) -> None:
     x, y = await drive_by_touch(page, fingers, orders)
     scrolled = await page.evaluate(SCROLLED)
     await fingers.press(1, (x, y))
     await fingers.move(1, (x, y - 37))
-    await orders.until(lambda found: found.stick == (0.5, 0.0))
+    await until_driven(orders, (0.5, 0.0))
     await fingers.press(2, (x + 30, y + 30))
     await fingers.move(2, (x + 40, y + 40))
     await asyncio.sleep(0.3)
-    await orders.until(lambda found: found.stick == (0.5, 0.0))  # another finger does not move it
+    await until_driven(orders, (0.5, 0.0))  # another finger does not move it
     await fingers.lift(2)
     await asyncio.sleep(0.3)
-    await orders.until(lambda found: found.stick == (0.5, 0.0))  # nor let it go
+    await until_driven(orders, (0.5, 0.0))  # nor let it go
     await fingers.move(1, (x + 200, y))
-    await orders.until(lambda found: found.stick == (0.0, -1.0))
+    await until_driven(orders, (0.0, -1.0))
     assert await page.evaluate(SCROLLED) == [0, scrolled[1]], "the page stays where it is"
     await fingers.lift(1)
-    await orders.until(lambda found: found.stick == (0.0, 0.0))
-    assert (orders.mode, await page.evaluate(HELD)) == (DriveMode.MANUAL, "false")
+    await until_driven(orders, (0.0, 0.0))
+    assert await page.evaluate(HELD) == "false"
+
+
+async def test_one_finger_holds_the_stick_and_no_other_moves_it_or_lets_it_go(
+    phone: tuple[Any, Fingers, Orders],
+) -> None:
+    """It is held for a second and more, in which a machine that does much else may let the page stand once."""
+    page, fingers, orders = phone
+    for _ in range(4):
+        try:
+            return await hold_with_a_second_finger(page, fingers, orders)
+        except LateHand:
+            await fingers.lose()
+    pytest.fail("the hand was late each time")
 
 
 async def test_a_touch_that_the_system_takes_away_lets_the_stick_go(phone: tuple[Any, Fingers, Orders]) -> None:
