@@ -13,7 +13,7 @@ COMPILE = $(VENV)/release/bin/uv pip compile -q --universal --fork-strategy fewe
 PAANI  := $(VENV)/bin/paani
 BIN    := $(VENV)/bin
 DEBIAN := libegl1 libopengl0 libgl1 libgl1-mesa-dri
-DEBIAN_TEST := $(DEBIAN) chromium libatomic1
+DEBIAN_TEST := $(DEBIAN) chromium-headless-shell libatomic1
 # What tests/deploy builds and runs containers with.
 DEBIAN_DEPLOY := docker.io iptables debootstrap faketime
 # What builds, emulates and checks the microcontroller's firmware: most of a gigabyte, which `make check` does without.

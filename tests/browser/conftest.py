@@ -20,7 +20,6 @@ from paani_services.dashboard.pages import StaticFile, load_static_files
 from tests.at_work import at_work
 from tests.conftest import OpenAs
 
-CHROMIUM = ("chromium", "chromium-browser", "google-chrome")
 PICTURE_BGR = (90, 70, 50)
 BOX = (0.125, 0.25, 0.375, 0.5)
 MASK_EDGE = 0.5  # water to the left, obstacle to the right
@@ -121,6 +120,8 @@ async def scripts_page(browser: Any) -> Any:
 @pytest.fixture
 async def browser() -> AsyncIterator[Any]:
     playwright = pytest.importorskip("playwright.async_api", reason="playwright is not installed")
+    from paani_tools.bench.deck.browser import CHROMIUM  # noqa: PLC0415  it needs playwright
+
     path = next((found for name in CHROMIUM if (found := shutil.which(name))), None)
     if path is None:
         pytest.skip("no Chromium on this machine")

@@ -60,6 +60,13 @@ TRY = """(async () => {
 LIMITS = "[...document.querySelectorAll('.lane u')].map((mark) => (parseFloat(mark.style.left) / 100).toFixed(2))"
 
 
+# A button that orders a mode is closed when it comes into the page.
+NOTE_OPEN_MODES = """new MutationObserver((changes) => {
+  for (const { addedNodes } of changes) for (const { dataset, disabled } of addedNodes)
+    if (dataset?.drive && !disabled) console.error(`${dataset.drive} may be ordered before anything is heard`);
+}).observe(document, { childList: true, subtree: true })"""
+
+
 class Watched:
     """A page, its console errors, and its requests to other hosts."""
 
@@ -85,6 +92,7 @@ async def watch(browser: Any, config: Config, width: int = 1440, height: int = 9
     origin = f"http://127.0.0.1:{config.dashboard.port}"
     page = await browser.new_page(viewport={"width": width, "height": height}, color_scheme="dark")
     watched = Watched(page, origin)
+    await page.add_init_script(NOTE_OPEN_MODES)
     key = await asyncio.to_thread(ensure_operator_key, config.bus)
     await page.goto(f"{origin}/#key={key}")
     return watched

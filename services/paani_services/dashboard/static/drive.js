@@ -140,7 +140,7 @@ const showWhatOneDrivesBy = () => requestAnimationFrame(() => requestAnimationFr
 export function bindDrive() {
   for (const mode of Object.keys(MODE_TEXTS)) {
     const button = make("button");
-    Object.assign(button, { type: "button" });
+    Object.assign(button, { type: "button", disabled: true }); // until it is known what may be ordered
     button.dataset.drive = mode;
     button.append(make("b", "", MODE_TEXTS[mode][0]), make("span", "", MODE_TEXTS[mode][1]));
     button.addEventListener("click", () => {

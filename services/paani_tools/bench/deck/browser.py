@@ -18,7 +18,7 @@ from paani.page_address import page_origin
 from paani_tools.bench.deck.loads import PageLoad
 from paani_tools.bench.deck.page_probe import PROBE, TAKE
 
-CHROMIUM = ("chromium", "chromium-browser", "google-chrome")
+CHROMIUM = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome")  # what shows no window first
 LIVE_TIMEOUT_S, POLL_S = 30.0, 0.01
 LIVE = "document.body.dataset.link === 'live'"
 LOADED = """() => {
