@@ -15,24 +15,27 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from playwright.async_api import async_playwright
+
+from paani_tools.bench.deck.browser import find_chromium, launched
 
 SIZE = {"width": 1600, "height": 950}
 PAGE_PORT, DATA_PORT = 9190, 9976
 DRAWN_S = 45.0  # in which a machine without a graphics processor has drawn it
 QUALITY = 88
-SOFTWARE = ("--no-sandbox", "--enable-unsafe-swiftshader", "--use-angle=swiftshader", "--ignore-gpu-blocklist")
+SOFTWARE = ("--enable-unsafe-swiftshader", "--use-angle=swiftshader", "--ignore-gpu-blocklist")
 
 
 async def take_picture(converted: Path) -> bytes:
     """The viewer of this machine alone, with everything loaded; PNG."""
+    chromium = find_chromium()
+    if chromium is None:
+        raise SystemExit("no Chromium on this machine")
     viewer = await asyncio.create_subprocess_exec(
         "rerun", str(converted), "--serve-web", "--bind", "127.0.0.1", "--web-viewer-port", str(PAGE_PORT),
         "--port", str(DATA_PORT), start_new_session=True,
     )  # fmt: skip
     try:
-        async with async_playwright() as driver:
-            browser = await driver.chromium.launch(executable_path="/usr/bin/chromium", args=SOFTWARE)
+        async with launched(chromium, SOFTWARE) as browser:
             page = await browser.new_page(viewport=SIZE, color_scheme="dark")
             await asyncio.sleep(3.0)
             source = f"rerun%2Bhttp://127.0.0.1:{DATA_PORT}/proxy"

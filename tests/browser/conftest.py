@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import shutil
 from collections.abc import AsyncIterator
 from typing import Any
 
@@ -119,13 +118,11 @@ async def scripts_page(browser: Any) -> Any:
 
 @pytest.fixture
 async def browser() -> AsyncIterator[Any]:
-    playwright = pytest.importorskip("playwright.async_api", reason="playwright is not installed")
-    from paani_tools.bench.deck.browser import CHROMIUM  # noqa: PLC0415  it needs playwright
+    pytest.importorskip("playwright.async_api", reason="playwright is not installed")
+    from paani_tools.bench.deck.browser import find_chromium, launched  # noqa: PLC0415  it needs playwright
 
-    path = next((found for name in CHROMIUM if (found := shutil.which(name))), None)
+    path = find_chromium()
     if path is None:
         pytest.skip("no Chromium on this machine")
-    async with playwright.async_playwright() as driver:
-        browser = await driver.chromium.launch(executable_path=path, args=["--no-sandbox", "--disable-gpu"])
+    async with launched(path) as browser:
         yield browser
-        await browser.close()

@@ -134,16 +134,28 @@ class Browser:
         return load
 
 
+def find_chromium() -> str | None:
+    """Where this machine has Chromium; None without one."""
+    return next((found for name in CHROMIUM if (found := shutil.which(name))), None)
+
+
+@contextlib.asynccontextmanager
+async def launched(path: str, drawing: tuple[str, ...] = ("--disable-gpu",)) -> AsyncIterator[Any]:
+    """The browser of Playwright that this program is. drawing: its options for how it draws."""
+    async with async_playwright() as driver:
+        browser = await driver.chromium.launch(executable_path=path, args=["--no-sandbox", *drawing])
+        try:
+            yield browser
+        finally:
+            await browser.close()
+
+
 @contextlib.asynccontextmanager
 async def chromium(config: Config) -> AsyncIterator[Browser]:
     """Raises UserError where there is none on this machine."""
-    path = next((found for name in CHROMIUM if (found := shutil.which(name))), None)
+    path = find_chromium()
     if path is None:
         raise UserError(f"bench deck: no Chromium on this machine (looked for {', '.join(CHROMIUM)})")
     key = await asyncio.to_thread(ensure_operator_key, config.bus)
-    async with async_playwright() as driver:
-        browser = await driver.chromium.launch(executable_path=path, args=["--no-sandbox", "--disable-gpu"])
-        try:
-            yield Browser(browser, config, key)
-        finally:
-            await browser.close()
+    async with launched(path) as browser:
+        yield Browser(browser, config, key)
