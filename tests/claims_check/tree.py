@@ -22,18 +22,27 @@ from tests.places import DATA
 PACKAGES = (".", "shared", "services", "sim_host", "models")  # folders that Python looks into, before all others
 LEFT_OUT = (".git", ".venv", "runs", "dist", "build", "__pycache__", ".*_cache", ".hypothesis", "*.egg-info")
 FAILED = 1  # exit code of pytest when tests ran and some failed
+MESSAGE_CHARS = 1000  # of why a test failed
 MTIME_STEP_NS = 10_000_000_000  # a mutant is so much newer that no compiled file passes for it
 
 
-class Outcome(NamedTuple):
-    """Of one run of pytest: its exit code (None: beyond the time limit), its last lines, and what each test did.
+class Tested(NamedTuple):
+    """What a test function did: the worst of its cases (`passed`, `skipped` or `failed`), their time together [s].
 
-    `tests`: by `file::function`, the worst of its cases (`passed`, `skipped` or `failed`) and their time together [s].
+    message: one line of why that case failed or skipped.
     """
+
+    state: str = "passed"
+    time_s: float = 0.0
+    message: str = ""
+
+
+class Outcome(NamedTuple):
+    """Of one run of pytest: exit code (None: beyond the time limit), last lines, its tests by `file::function`."""
 
     exit_code: int | None
     tail: str
-    tests: dict[str, tuple[str, float]]
+    tests: dict[str, Tested]
 
 
 class Tree:
@@ -116,16 +125,22 @@ def digest_of(root: Path) -> str:
     return digest.hexdigest()
 
 
-def _read_report(report: Path) -> dict[str, tuple[str, float]]:
+def _read_report(report: Path) -> dict[str, Tested]:
     """What each test function did, by `file::function`; empty where no report was written."""
     if not report.is_file():
         return {}
-    rank = ("passed", "skipped", "failed")
-    worst: dict[str, tuple[str, float]] = {}
+    worst: dict[str, Tested] = {}
     for case in ET.parse(report).getroot().iter("testcase"):
         name = f"{case.get('classname', '').replace('.', '/')}.py::{case.get('name', '').partition('[')[0]}"
-        kinds = {child.tag for child in case}
-        now = "failed" if kinds & {"failure", "error"} else "skipped" if "skipped" in kinds else "passed"
-        before, time_s = worst.get(name, ("passed", 0.0))
-        worst[name] = (max(before, now, key=rank.index), time_s + float(case.get("time", "0")))
+        before, now = worst.get(name, Tested()), _read_case(case)
+        worse = max(before, now, key=lambda each: ("passed", "skipped", "failed").index(each.state))
+        worst[name] = worse._replace(time_s=before.time_s + now.time_s)
     return worst
+
+
+def _read_case(case: ET.Element) -> Tested:
+    bad = {child.tag: child for child in case if child.tag in ("failure", "error", "skipped")}
+    fault = next((bad[tag] for tag in ("failure", "error", "skipped") if tag in bad), None)
+    state = "passed" if fault is None else "skipped" if fault.tag == "skipped" else "failed"
+    message = "" if fault is None else " ".join(fault.get("message", "").split())[:MESSAGE_CHARS]
+    return Tested(state, float(case.get("time", "0")), message)

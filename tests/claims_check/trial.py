@@ -10,11 +10,12 @@ from typing import Literal
 import msgspec
 
 from tests.claims_check.table import Mutant, Row
-from tests.claims_check.tree import FAILED, Tree
+from tests.claims_check.tree import FAILED, Tested, Tree
 
 State = Literal["killed", "survived", "error"]
 UNBROKEN_LIMIT_S = 3600.0
 START_LIMIT_S = 60.0  # for Python, imports and collection
+DID_NOT_RUN = Tested("did not run")
 TIMES_UNBROKEN = 5.0  # a mutant's tests may take so many times what they take unbroken
 
 
@@ -66,15 +67,15 @@ def try_rows(rows: dict[str, Row], tree: Tree, digest: str, record: Record) -> I
     tests = sorted({test for name in unknown for test in rows[name].test})
     unbroken = tree.run_tests(tests, UNBROKEN_LIMIT_S).tests if tests else {}
     for name, row in rows.items():
-        faults = [f"{test} {unbroken.get(test, ('did not run', 0.0))[0]}" for test in row.test]
-        faults = [fault for fault in faults if not fault.endswith(" passed")]
+        tested = {test: unbroken.get(test, DID_NOT_RUN) for test in row.test}
+        faults = [f"{test} {each.state} {each.message}" for test, each in tested.items() if each.state != "passed"]
         for key, mutant in zip(keys[name], row.mutant, strict=True):
             if known := record.find(key):
                 yield known
             elif faults:
-                yield Verdict(key, name, "error", f"unbroken: {faults[0]}", mutant)
+                yield Verdict(key, name, "error", f"unbroken: {faults[0].strip()}", mutant)
             else:
-                times_s = {test: unbroken[test][1] for test in row.test}
+                times_s = {test: each.time_s for test, each in tested.items()}
                 yield record.add(_try_mutant(key, name, mutant, times_s, tree))
 
 
@@ -86,7 +87,7 @@ def _try_mutant(key: str, name: str, mutant: Mutant, times_s: dict[str, float], 
         return Verdict(key, name, "survived", "every cited test passes", mutant)
     if outcome.exit_code is None:
         return Verdict(key, name, "killed", outcome.tail, mutant)
-    failed = [test for test, (what, _) in outcome.tests.items() if what == "failed"]
+    failed = [test for test, each in outcome.tests.items() if each.state == "failed"]
     if outcome.exit_code == FAILED and failed:
         return Verdict(key, name, "killed", failed[0], mutant)
     return Verdict(key, name, "error", " | ".join(outcome.tail.splitlines()[-3:]), mutant)
