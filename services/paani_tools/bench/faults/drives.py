@@ -123,4 +123,4 @@ def _own(folder: Path) -> tuple[str, ...]:
 def faked_clock() -> dict[str, str]:
     """Environment of processes whose wall clock a further variable of libfaketime shifts; empty without libfaketime."""
     found = [str(path) for pattern in LIBRARIES for path in Path("/").glob(pattern.lstrip("/"))]
-    return {"LD_PRELOAD": found[0], "FAKETIME_NO_CACHE": "1", "DONT_FAKE_MONOTONIC": "1"} if found else {}
+    return {"LD_PRELOAD": found[0], "FAKETIME_CACHE_DURATION": "1", "DONT_FAKE_MONOTONIC": "1"} if found else {}
