@@ -20,7 +20,7 @@ from paani_services.navigator.avoidance.clearance import (
     predict_clearances,
     separation_margin_m,
 )
-from paani_services.navigator.avoidance.evaluation import CandidateEvaluation, angles_between_rad
+from paani_services.navigator.avoidance.evaluation import CandidateEvaluation
 from paani_services.navigator.avoidance.passages import Passages
 
 QUARTER_TURN_RAD = 0.5 * math.pi
@@ -32,7 +32,7 @@ PROXIMITY_RANGE_M = 2.0
 MARGIN_INTRUSION_WEIGHT = 10.0
 UNKNOWN_WATER_WEIGHT = 0.3  # a path all over unknown water: the boat turns to what it sees, and sees further from there
 LOST_PROGRESS_WEIGHT = 0.3  # nothing made good along the desired course
-HEADING_CHANGE_WEIGHT = 0.15  # a quarter turn off the heading of the plan before
+HEADING_CHANGE_WEIGHT = 0.15  # a quarter turn more or less than the plan before still makes, which turns one way
 # Of a candidate's other costs, a quarter turn off that heading: from picture to picture the costs of one heading change
 # by less, with what is seen and how far off it is taken to be.
 HEADING_CHANGE_FRAC = 0.1
@@ -83,7 +83,8 @@ def weigh_candidates(evaluation: CandidateEvaluation, margin_m: F64, passages: P
     made_good = speeds_mps / speeds_mps[0] * np.array([portable.cos(each) for each in deviation_rad.tolist()])
     change_rad = np.zeros_like(deviation_rad)
     if previous is not None and previous.speed_mps > 0.0:
-        change_rad = angles_between_rad(evaluation.offsets_rad, wrap_rad(previous.heading_rad - request.start.yaw_rad))
+        # Of two headings abaft the beam that lie side by side one may be reached over port, one over starboard.
+        change_rad = np.abs(evaluation.offsets_rad - wrap_rad(previous.heading_rad - request.start.yaw_rad))
     disregard = np.clip(1.0 - request.setpoint.advised_side * evaluation.offsets_rad / ADVISED_TURN_RAD, 0.0, 1.0)
     is_looked_at = travelled_m <= config.look_m
     ahead_m = least_of_obstacles_m(separation_margin_m(_predict_leading(evaluation), evaluation.paths.time_s, config))

@@ -12,11 +12,12 @@ from hypothesis import strategies as st
 
 from paani.geometry import wrap_rad
 from paani.messages import Constraint, HeadingVerdict
+from paani_services.navigator.avoidance.planner import judge_candidates
 from paani_services.navigator.avoidance.rollout import BoatState, GuidanceSetpoint, Plan
 from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle
 from paani_services.navigator.mapping.occupancy_grid import GRID_CELLS, OccupancyGrid
 from paani_services.navigator.mapping.velocity_fit import Velocity
-from tests.synthetic_water import PLANNER, explain_motion, pool
+from tests.synthetic_water import PLANNER, explain_motion, pool, request_on
 
 CRUISING, RESTING = BoatState(0.0, 0.0, 0.0, 0.6), BoatState(0.0, 0.0, 0.0)
 AHEAD = GuidanceSetpoint(0.0, 0.6)
@@ -97,6 +98,20 @@ def test_in_open_water_the_course_costs_nothing_and_others_by_name() -> None:
     assert port.costs.progress == pytest.approx(0.3 * (1.0 - math.cos(math.radians(10.0))), abs=1e-3)
     assert port.costs.advice == pytest.approx(0.15 * (1.0 - 10.0 / 25.0), abs=1e-3)
     assert starboard.costs.advice == 0.15
+
+
+@settings(max_examples=25, deadline=None)
+@given(side=st.sampled_from([1.0, -1.0]), turn_deg=st.floats(20.0, 179.0), speed=st.sampled_from([0, 1, 2]))
+def test_to_turn_the_other_way_costs_more_than_to_go_straight_on(side: float, turn_deg: float, speed: int) -> None:
+    """Though its heading lies beside that of the plan before: what was turned is undone first."""
+    water, before = basin(wall(range(0))), Plan(side * math.radians(turn_deg), 0.6)
+    judged = judge_candidates(request_on(water, CRUISING, AHEAD, before))
+    assert judged is not None
+    chosen = judged.evaluation.speeds_mps == judged.evaluation.speeds_mps[speed]
+    offsets_rad, changes = judged.evaluation.offsets_rad[chosen], judged.costs.heading_change[chosen]
+    other_way = side * offsets_rad < 0.0
+    assert other_way.sum() >= 12
+    assert (changes[other_way] > changes[offsets_rad == 0.0]).all()
 
 
 def test_obstacles_cost_what_is_near_and_what_is_further_along_the_path() -> None:
