@@ -77,9 +77,12 @@ def is_whole_run(config: pytest.Config) -> bool:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """In a whole run what starts processes gets a second try, which the summary tells; what stops the boat not."""
-    items.sort(key=lambda item: (not is_alone(item.nodeid), not item.nodeid.startswith(SOAK)))
+    """In a whole run what watches the clock comes first, and what starts processes gets a second try.
+
+    The summary tells of it; what stops the boat gets none. Named tests run in the order in which they are named.
+    """
     if is_whole_run(config):
+        items.sort(key=lambda item: (not is_alone(item.nodeid), not item.nodeid.startswith(SOAK)))
         for item in items:
             if item.nodeid.split("/")[1] in ALONE - STOPS_THE_BOAT:
                 item.add_marker(pytest.mark.flaky(reruns=1))

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import random
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -121,3 +123,15 @@ def test_a_few_rows_of_ours_are_killed() -> None:
     drawn = random.Random(digest_of(ROOT / "shared")).sample(quick, DRAWN)
     verdicts = check_rows({name: table[name] for name in drawn}, ROOT, ROOT / "runs" / "claims-check.jsonl")
     assert [v for v in verdicts if v.state != "killed"] == []
+
+
+def test_named_tests_run_in_the_order_in_which_they_are_named() -> None:
+    """The quick ones first: they kill most mutants, in seconds, before the boat is driven."""
+    named = [
+        "tests/unit/paani/test_thrust_adapter.py::test_o2_zero_half_a_second_after_the_last_command",
+        "tests/fault/test_catalogue.py::test_each_fault_once",
+    ]
+    words = [sys.executable, "-m", "pytest", "--collect-only", "-q", "-p", "no:cacheprovider", *named]
+    collected = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True).stdout.splitlines()
+    assert collected[0] == named[0]
+    assert collected[1].startswith(named[1])
