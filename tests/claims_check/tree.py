@@ -23,6 +23,7 @@ PACKAGES = (".", "shared", "services", "sim_host", "models")  # folders that Pyt
 LEFT_OUT = (".git", ".venv", "runs", "dist", "build", "__pycache__", ".*_cache", ".hypothesis", "*.egg-info")
 FAILED = 1  # exit code of pytest when tests ran and some failed
 MESSAGE_CHARS = 1000  # of why a test failed
+STATES = {"skipped": "skipped", "failure": "failed", "error": "failed"}  # by the element of a report
 MTIME_STEP_NS = 10_000_000_000  # a mutant is so much newer that no compiled file passes for it
 
 
@@ -133,14 +134,18 @@ def _read_report(report: Path) -> dict[str, Tested]:
     for case in ET.parse(report).getroot().iter("testcase"):
         name = f"{case.get('classname', '').replace('.', '/')}.py::{case.get('name', '').partition('[')[0]}"
         before, now = worst.get(name, Tested()), _read_case(case)
-        worse = max(before, now, key=lambda each: ("passed", "skipped", "failed").index(each.state))
-        worst[name] = worse._replace(time_s=before.time_s + now.time_s)
+        worst[name] = max(before, now, key=_severity)._replace(time_s=before.time_s + now.time_s)
     return worst
 
 
 def _read_case(case: ET.Element) -> Tested:
-    bad = {child.tag: child for child in case if child.tag in ("failure", "error", "skipped")}
-    fault = next((bad[tag] for tag in ("failure", "error", "skipped") if tag in bad), None)
-    state = "passed" if fault is None else "skipped" if fault.tag == "skipped" else "failed"
-    message = "" if fault is None else " ".join(fault.get("message", "").split())[:MESSAGE_CHARS]
-    return Tested(state, float(case.get("time", "0")), message)
+    found = [
+        Tested(STATES[child.tag], message=" ".join(child.get("message", "").split())[:MESSAGE_CHARS])
+        for child in case
+        if child.tag in STATES
+    ]
+    return max(found, key=_severity, default=Tested())._replace(time_s=float(case.get("time", "0")))
+
+
+def _severity(tested: Tested) -> int:
+    return ("passed", "skipped", "failed").index(tested.state)

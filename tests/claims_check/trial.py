@@ -15,8 +15,8 @@ from tests.claims_check.tree import FAILED, Tested, Tree
 State = Literal["killed", "survived", "error"]
 UNBROKEN_LIMIT_S = 3600.0
 START_LIMIT_S = 60.0  # for Python, imports and collection
-DID_NOT_RUN = Tested("did not run")
 TIMES_UNBROKEN = 5.0  # a mutant's tests may take so many times what they take unbroken
+DID_NOT_RUN = Tested("did not run")
 
 
 class Verdict(msgspec.Struct, frozen=True):

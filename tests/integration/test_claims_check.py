@@ -91,6 +91,7 @@ def test_mutants_are_killed_or_survive_and_a_test_that_does_not_pass_is_named(
     assert "H2: survived: shared/it.py: `3 < 4` -> `3 << 4` (every cited test passes)" in printed
     assert "H3: error: shared/it.py: `3 < 4` -> `4 < 3` (unbroken: tests/test_it.py::test_skips skipped " in printed
     assert "test_skips skipped no engine here)" in printed
+    assert "test_fails failed assert not True" in printed
     assert "H4: error: shared/it.py: `3 < 4` -> `4 < 3` (unbroken: tests/test_it.py::test_fails failed " in printed
     assert printed.splitlines()[-1] == "4 rows, 5 mutants: 1 killed, 2 survived, 2 errors"
     assert (product / "shared" / "it.py").read_text() == PRODUCT

@@ -32,8 +32,8 @@ PROXIMITY_RANGE_M = 2.0
 MARGIN_INTRUSION_WEIGHT = 10.0
 UNKNOWN_WATER_WEIGHT = 0.3  # a path all over unknown water: the boat turns to what it sees, and sees further from there
 LOST_PROGRESS_WEIGHT = 0.3  # nothing made good along the desired course
-HEADING_CHANGE_WEIGHT = 0.15  # a quarter turn more or less than the plan before still makes, which turns one way
-# Of a candidate's other costs, a quarter turn off that heading: from picture to picture the costs of one heading change
+HEADING_CHANGE_WEIGHT = 0.15  # a quarter turn between a candidate's turn and the one that the plan before still makes
+# Of a candidate's other costs, a quarter turn between the two: from picture to picture the costs of one heading change
 # by less, with what is seen and how far off it is taken to be.
 HEADING_CHANGE_FRAC = 0.1
 # And of what a blow costs it, times its probability: the better side to leave a vessel on changes with each
