@@ -145,6 +145,26 @@ def test_rest_is_found_again_after_a_voyage() -> None:
     assert sum(each.stopped for each in estimates) > 15 * 20
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("drift_mps", [0.0, 0.02, 0.04, 0.08])
+@pytest.mark.parametrize("imu_gap_s", [0.0, 1.0])
+def test_after_a_voyage_rest_is_rest_in_the_water_that_carries_the_boat(
+    drift_mps: float, imu_gap_s: float, seed: int
+) -> None:
+    """Stopped in a current, it knows within half a metre how far it was carried in a minute; its IMU measures nothing."""
+    boat = wandering(seed)
+    boat.sail(20.0)
+    boat.sail(60.0, surge_mps=0.6)
+    boat.sail(20.0, surge_mps=drift_mps)
+    boat.imu = False
+    boat.sail(imu_gap_s, surge_mps=drift_mps)
+    boat.imu = True
+    boat.sail(20.0, surge_mps=drift_mps)
+    estimates = boat.sail(60.0, surge_mps=drift_mps)
+    velocity_mps = [complex(each.surge_mps, each.sway_mps) for each in estimates]  # it holds its heading
+    assert abs(sum(velocity_mps) / 20.0 - 60.0 * drift_mps) < 0.5
+
+
 def test_an_imu_without_noise_does_not_keep_rest() -> None:
     """An IMU that repeats one sample is broken, so the receiver decides."""
     boat = wandering()

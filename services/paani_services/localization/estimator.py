@@ -46,7 +46,7 @@ SWAY_STD_MPS = 1.4  # of one step of "sway is about zero"; at 20 Hz worth as muc
 STRAIGHT_RADPS = 0.03  # at a higher yaw rate the hull slides outwards, so that its sway is not about zero
 LOCAL_SWAY_STD_MPS = 0.15  # the same for the local filter, which has nothing else
 LOCAL_SURGE_STD_MPS = 2.0  # lets the local filter's surge fade towards zero instead of running away
-REST_STD_MPS = 0.03  # of the speed while the boat is found to lie still
+REST_STD_MPS = 0.03  # of the speed while the boat is found to lie still, over ground or in the water
 SPEED_DOUBT_MPS = 0.3  # added to the standard deviation of the speed when fixes keep contradicting it
 CONVERGED_FIXES = 5  # accepted before the position may be believed
 REGAINED_FIXES = 3  # accepted after an outage before the position may be believed again
@@ -136,8 +136,10 @@ class Estimator:
             self._correct_heading(self._global, newest.yaw_rad, step_s)
         if abs(yaw_rate - float(self._global.x[B])) < STRAIGHT_RADPS:
             self._global.correct_sideslip(SWAY_STD_MPS)
-        if self._rest.at_rest:
+        if self._rest.is_moored:
             self._global.correct_velocity(0.0, 0.0, REST_STD_MPS, math.inf, is_course_known=False)
+        elif self._rest.at_rest:
+            self._global.correct_sideslip(REST_STD_MPS, REST_STD_MPS)
 
     def _correct_heading(self, global_filter: PlanarFilter, yaw_rad: float, step_s: float) -> None:
         """Correct with the compass; where it is refused for long, doubt heading and compass: the course decides."""
@@ -155,7 +157,7 @@ class Estimator:
         for each in (self._local, self._global):
             if each is not None:
                 each.inflate_covariance(_std(p=speed_mps * gap_s, psi=turn_rad, speed=speed_mps))
-        self._rest = RestDetector()
+        self._rest = RestDetector(has_moved=self._rest.has_moved)
         self._accepted_fixes = min(self._accepted_fixes, CONVERGED_FIXES - REGAINED_FIXES)
 
     def _calibrate(self, samples: Sequence[ImuSample]) -> None:
@@ -200,7 +202,7 @@ class Estimator:
         vx_now, vy_now = self._global.velocity
         x_m, y_m = x_m + vx_now * lag_s, y_m + vy_now * lag_s
         self._correct_position(self._global, x_m, y_m, fix)
-        if not self._rest.at_rest:
+        if not self._rest.is_moored:
             self._correct_speed(self._global, vx_mps, vy_mps, std_mps)
 
     def _correct_position(self, global_filter: PlanarFilter, x_m: float, y_m: float, fix: GpsFix) -> None:

@@ -4,7 +4,9 @@ A receiver at a quay shows speeds of decimetres a second for minutes at a time, 
 A boat does not start to move without its IMU measuring it. So rest, once found, is kept against the receiver until
   1. the IMU shows a push, a turn, or more than ripples, or
   2. position and speed of the fixes together leave what the receiver's own error explains.
-Finding rest after motion takes more: a quiet IMU, and a mean speed near zero by any receiver's standard.
+Finding rest after motion takes more: a quiet IMU, and a mean speed near zero by any receiver's standard. What has moved
+is afloat, and water carries it without its IMU measuring it: at rest it makes no way through the water, and no more is
+known. Only a boat that never moved is taken to be moored.
 The limits were set on one recorded log of ten minutes at a dock.
 """
 
@@ -48,15 +50,23 @@ class MapFix(NamedTuple):
 
 
 class RestDetector:
-    """Takes every step of the IMU and every fix; `at_rest` is the verdict."""
+    """Takes every step of the IMU and every fix; `at_rest` and `is_moored` are the verdicts.
 
-    def __init__(self) -> None:
+    has_moved: what is known of the boat from before.
+    """
+
+    def __init__(self, *, has_moved: bool = False) -> None:
         self._motion: deque[MotionEvidence] = deque()
         self._fixes: deque[MapFix] = deque()
         self._rest_accel_mps2 = (0.0, 0.0)  # mean acceleration when rest was found, ahead and left
         self._rest_position_m = (0.0, 0.0)
-        self._has_moved = False
+        self.has_moved = has_moved
         self.at_rest = False
+
+    @property
+    def is_moored(self) -> bool:
+        """Whether the boat lies still over ground: at rest, and its IMU never measured motion."""
+        return self.at_rest and not self.has_moved
 
     def add_motion(self, motion: MotionEvidence) -> None:
         """Take one step of the IMU."""
@@ -96,11 +106,11 @@ class RestDetector:
         if self._motion[-1].at_us - self._motion[0].at_us < 0.9 * QUIET_S * 1e6:
             return
         if self._is_disturbed():
-            self._has_moved = True
+            self.has_moved = True
             return
         if fixes[-1].at_us - fixes[0].at_us < 0.7 * REST_FOUND_S * 1e6:
             return
-        if self._has_moved:
+        if self.has_moved:
             mean_mps = math.hypot(fmean(each.vx_mps for each in fixes), fmean(each.vy_mps for each in fixes))
             spread_mps = fmean(each.std_mps for each in fixes) / math.sqrt(len(fixes))
             is_found = mean_mps <= min(REST_FOUND_SIGMAS * spread_mps, REST_FOUND_MPS - REST_FOUND_SIGMAS * spread_mps)
@@ -113,7 +123,7 @@ class RestDetector:
             self._rest_position_m = fmean(each.x_m for each in fixes), fmean(each.y_m for each in fixes)
 
     def _end_rest(self, *, by_imu: bool) -> None:
-        self.at_rest, self._has_moved = False, self._has_moved or by_imu
+        self.at_rest, self.has_moved = False, self.has_moved or by_imu
         self._rest_accel_mps2 = (0.0, 0.0)
         self._fixes.clear()
         self._motion.clear()
