@@ -110,3 +110,21 @@ def test_a_stopped_boat_does_not_drift_on_to_what_it_stopped_for(
     )
     assert adrift_m > 10.0
     assert kept_m < 10.0 / 90.0 * adrift_m
+
+
+@pytest.mark.parametrize("to_the_bow_rad", [0.0, math.pi, 0.5 * math.pi], ids=["bow first", "stern first", "abeam"])
+def test_a_boat_that_stopped_under_way_notices_that_it_is_carried_slowly(to_the_bow_rad: float) -> None:
+    """0.04 m/s of current, by the simulator's receiver and IMU: it is kept within a metre for 90 s, not carried 3.6 m."""
+    lake = open_water("lake")
+    current = Current(speed_mps=0.04, toward_rad=lake.start.yaw_rad + to_the_bow_rad)
+    boat = Lockstep(dataclasses.replace(lake, current=current), load_config())
+    boat.settle(15.0)
+    assert boat.plant.velocity[0] > 0.3
+    boat.camera = CAMERA
+    for _ in boat.run(10.0):
+        stop_by_the_advice(boat)
+    from_m = boat.plant.position_m
+    for _ in boat.run(90.0):
+        stop_by_the_advice(boat)
+    assert math.dist(from_m, boat.plant.position_m) < 1.0
+    boat.plant.close()
