@@ -22,7 +22,9 @@ BOX_STEPS = 512  # of the picture's width and height, in which boxes are stored
 POSE_SPACING_US = 90_000  # between two remembered poses, at least
 MAX_POSES = 14  # they span 1.2 s, which is longer than a picture takes to become evidence
 OBSERVATION_SPACING_US = 100_000  # between two remembered observations, at least
-OLD_OBSERVATIONS = 25  # kept for what is out of sight, evenly over `hidden_s`; more cost time in every plan
+OLD_OBSERVATIONS = 25  # kept for what is out of sight; more cost time in every plan
+# Pictures from within a square of this size, to sides within this angle, show the same but for a seventh of their width.
+VIEW_SIZE_M, VIEW_SIZE_RAD = 1.0, math.radians(10.0)
 BOX_SPACING_US = 190_000  # between those kept for their boxes alone
 MAX_OBSERVATIONS = 224
 OUTLINE_POINTS = 9  # of a box's waterline
@@ -311,19 +313,45 @@ def _prune_observations(observations: tuple[Observation, ...], config: PlannerCo
     more for the velocities of dynamic obstacles.
     """
     newest_us = observations[-1].stamp_us
+    views = _distinct_views(observations, newest_us, config)
     kept: list[Observation] = []
-    old_spacing_us = round(config.hidden_s * 1e6 / OLD_OBSERVATIONS)
-    old_us = last_us = -old_spacing_us
+    last_us = -BOX_SPACING_US
     for observation in observations:
         age_s = (newest_us - observation.stamp_us) * 1e-6
-        is_apart = observation.stamp_us - last_us >= BOX_SPACING_US
         if age_s <= config.occupied_s:
             kept.append(observation)
-        elif age_s <= config.hidden_s and observation.water_edge and observation.stamp_us - old_us >= old_spacing_us:
+        elif observation.stamp_us in views:
             kept.append(observation)
-            old_us = last_us = observation.stamp_us
-        elif age_s <= config.fit_s + config.unseen_s and observation.boxes and is_apart:
+            last_us = observation.stamp_us
+        elif (
+            age_s <= config.fit_s + config.unseen_s
+            and observation.boxes
+            and observation.stamp_us - last_us >= BOX_SPACING_US
+        ):
             is_bare = not observation.water_edge and not observation.feet  # the same object stays: its hash is kept
             kept.append(observation if is_bare else msgspec.structs.replace(observation, water_edge=b"", feet=()))
             last_us = observation.stamp_us
     return tuple(kept[-MAX_OBSERVATIONS:])
+
+
+def _distinct_views(observations: tuple[Observation, ...], newest_us: int, config: PlannerConfig) -> frozenset[int]:
+    """Stamps of the newest of the older pictures from each square to each side, of `OLD_OBSERVATIONS` of these.
+
+    A boat that lies still or turns on the spot so remembers each side as it last looked there, however long it lies.
+    """
+    found: dict[tuple[int, int, int], int] = {}
+    for each in reversed(observations):
+        if each.water_edge and config.occupied_s < (newest_us - each.stamp_us) * 1e-6 <= config.hidden_s:
+            found.setdefault(_view(each), each.stamp_us)
+        if len(found) == OLD_OBSERVATIONS:
+            break
+    return frozenset(found.values())
+
+
+def _view(observation: Observation) -> tuple[int, int, int]:
+    """The numbers of the square and of the side that it was taken from and to."""
+    return (
+        math.floor(observation.x_m / VIEW_SIZE_M),
+        math.floor(observation.y_m / VIEW_SIZE_M),
+        math.floor(observation.yaw_rad / VIEW_SIZE_RAD),
+    )

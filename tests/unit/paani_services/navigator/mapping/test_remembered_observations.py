@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import msgspec
@@ -9,9 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from paani.geometry import wrap_rad
 from paani.messages import Odometry, SegmentationSource, TimeBase
 from paani_services.navigator.mapping.observation import (
     OLD_OBSERVATIONS,
+    VIEW_SIZE_M,
+    VIEW_SIZE_RAD,
     ObservationMemory,
     is_free_space_evidence,
     update_memory,
@@ -22,6 +26,7 @@ from paani_services.navigator.mapping.stamped_pose import interpolate_pose
 from paani_sim.eye.camera import BoatPose
 from tests.synthetic_water import AT_REST, CAMERA, PLANNER, START_US, evidence, observe_from, odometry, water_edge_of
 
+STEP_S, TURN_RADPS = 0.4, 0.1
 AHEAD_5_M = ((5.0, -1.0, 5.6, 1.0),)
 
 
@@ -127,11 +132,11 @@ def test_unusable_odometry_is_not_dead_reckoned(changes: dict[str, float]) -> No
 @pytest.mark.slow
 def test_every_picture_in_use_is_projected_once_and_few_others_are_kept() -> None:
     """At 30 Hz. Cells of pictures that are out of use are megabytes that come and go with what is seen."""
-    memory, period_us = ObservationMemory(), 33_333
+    memory, period_us, edge = ObservationMemory(), 33_333, water_edge_of(AT_REST)
     for k in range(round((PLANNER.hidden_s + 2.0) * 1e6 / period_us)):
         at_us = START_US + k * period_us
-        seen = msgspec.structs.replace(evidence(at_us, water_edge_of(AT_REST)), frame_seq=k)
-        memory = update_memory(memory, odometry(at_us, AT_REST), seen, PLANNER)
+        seen = msgspec.structs.replace(evidence(at_us, edge), frame_seq=k)
+        memory = update_memory(memory, odometry(at_us, BoatPose(0.0, 0.0, k * TURN_RADPS / 30.0)), seen, PLANNER)
     grid_of(memory, 0.0)
     made = project_to_cells.cache_info()
     grid_of(memory, 0.0)
@@ -140,15 +145,42 @@ def test_every_picture_in_use_is_projected_once_and_few_others_are_kept() -> Non
     assert made.maxsize <= 2 * len(memory.observations)
 
 
-@pytest.mark.parametrize("hidden_s", [10.0, 20.0, 30.0, 60.0])
-def test_the_old_pictures_kept_reach_back_as_far_as_asked_and_are_as_many(hidden_s: float) -> None:
-    """What a plan costs does not grow with how long it is remembered what stands."""
-    config, memory = msgspec.structs.replace(PLANNER, hidden_s=hidden_s), ObservationMemory()
-    for k in range(round((hidden_s + 5.0) / 0.2)):
-        at_us = START_US + k * 200_000
-        seen = msgspec.structs.replace(evidence(at_us, water_edge_of(AT_REST)), frame_seq=k)
-        memory = update_memory(memory, odometry(at_us, AT_REST), seen, config)
+@settings(max_examples=25, deadline=None)
+@given(
+    yaws_rad=st.lists(st.floats(-math.pi, math.pi), min_size=1, max_size=12),
+    lies_s=st.floats(0.0, PLANNER.hidden_s),
+    steps_m=st.sampled_from([0.0, 0.02, 0.2]),
+)
+def test_each_side_is_remembered_as_it_was_looked_at_last(
+    yaws_rad: list[float], lies_s: float, steps_m: float
+) -> None:
+    """By a boat that lies still or makes little way; and what a plan costs does not grow with how long it lies."""
+    memory, at_us, looked = ObservationMemory(), START_US, []
+    edge = water_edge_of(AT_REST)
+    for number, yaw_rad in enumerate([*yaws_rad, *[yaws_rad[-1]] * round(lies_s / STEP_S)]):
+        at_us += round(STEP_S * 1e6)
+        pose = BoatPose(steps_m * min(number, len(yaws_rad)), 0.0, yaw_rad)
+        memory = observe_from(pose, edge, at_us, memory)
+        looked.append((at_us, pose))
+    kept = [each for each in memory.observations if each.water_edge]
+    for then_us, pose in looked:
+        if (at_us - then_us) * 1e-6 <= PLANNER.hidden_s:
+            assert any(
+                each.stamp_us >= then_us
+                and abs(wrap_rad(each.yaw_rad - pose.yaw_rad)) <= VIEW_SIZE_RAD
+                and math.hypot(each.x_m - pose.x_m, each.y_m - pose.y_m) <= 2.0 * VIEW_SIZE_M
+                for each in kept
+            )
+    old_us = at_us - round(PLANNER.occupied_s * 1e6)
+    assert sum(each.stamp_us < old_us for each in kept) <= min(len(yaws_rad) + 1, OLD_OBSERVATIONS)
+
+
+def test_the_newest_old_pictures_are_kept_of_a_boat_that_goes_on() -> None:
+    memory, edge = ObservationMemory(), water_edge_of(AT_REST)
+    for number in range(150):
+        memory = observe_from(BoatPose(0.24 * number, 0.0, 0.0), edge, START_US + number * 400_000, memory)
     newest_us = memory.observations[-1].stamp_us
-    ages_s = [(newest_us - each.stamp_us) * 1e-6 for each in memory.observations if each.water_edge]
-    assert 20 <= sum(age_s > config.occupied_s for age_s in ages_s) <= OLD_OBSERVATIONS
-    assert hidden_s - 0.1 * hidden_s <= max(ages_s) <= hidden_s
+    old_us = newest_us - round(PLANNER.occupied_s * 1e6)
+    old = [each for each in memory.observations if each.water_edge and each.stamp_us < old_us]
+    assert len(old) == OLD_OBSERVATIONS or (newest_us - old[0].stamp_us) * 1e-6 > PLANNER.hidden_s - 3.0
+    assert all(later.x_m - earlier.x_m > 0.5 * VIEW_SIZE_M for earlier, later in itertools.pairwise(old[:-1]))
