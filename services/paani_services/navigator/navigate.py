@@ -32,6 +32,7 @@ from paani_services.navigator.avoidance.replanning import (
     replan,
 )
 from paani_services.navigator.avoidance.rollout import GuidanceSetpoint
+from paani_services.navigator.guidance.headway import Headway, note_headway
 from paani_services.navigator.guidance.ilos import IlosState, hold_integral, integrate
 from paani_services.navigator.guidance.mission_progress import (
     LegSetpoint,
@@ -61,6 +62,7 @@ from paani_services.navigator.guidance.visual_turns import (
 from paani_services.navigator.interlocks import NavigatorInputs, find_inhibits
 from paani_services.navigator.mapping.observed_cells import Camera
 from paani_services.navigator.mapping.occupancy_grid import UNCALIBRATED_CAMERA
+from paani_services.navigator.way_round import course_round_rad
 
 
 class NavigatorState(
@@ -79,6 +81,7 @@ class NavigatorState(
     `is_ordered`: an order of a mode was heard. Of HOLD or RETURN: `errand` is how far that has come, `errand_ilos` its
     integral, `errand_since_us` when it was ordered. `progress` and `ilos` are those of the mission throughout.
     `legs_us`: stamp of the legs that they count for. `station`: where the boat is kept while it stops.
+    `headway`: that along its path.
     """
 
     progress: MissionProgress = MissionProgress()
@@ -94,6 +97,7 @@ class NavigatorState(
     errand_since_us: int = 0
     legs_us: int = 0
     station: Station | None = None
+    headway: Headway = Headway()
 
 
 def navigate(
@@ -134,6 +138,9 @@ def navigate(
     if not is_allowed(mission.bounds, position_m) and not config.fence_return:
         inhibits.append(Inhibit.OUTSIDE_FENCE)
     leg, cross_m = describe_leg(state.progress, mission), setpoint.cross_track_m
+    headway = Headway() if inhibits and inhibits != [Inhibit.ADVISED_STOP] else state.headway
+    headway = note_headway(headway, setpoint, state.progress.waypoints_reached, position_m, now_us)
+    state = msgspec.structs.replace(state, headway=headway)
     if inhibits:
         state = hold_cross_track(state, now_us)
         state, at_station = _keep_station(state, inhibits, inputs, now_us, config, camera)
@@ -155,6 +162,9 @@ def navigate(
         # The planner weighs the advised side against what the map shows.
         # It turns as slowly as every advised turn is, but for one out of the way of what comes to the boat.
         looks = is_turn_to_look(advisory)
+        detour_rad = course_round_rad(state.planner_state, state.headway, setpoint, odometry, now_us, config.planner)
+        if detour_rad is not None:
+            heading_rad, leg = detour_rad, f"{leg}, by a way round what bars it"
         planner_setpoint = GuidanceSetpoint(
             heading_rad, speed_mps, TURN_SIDE.get(direction, 0.0), looks, 0.0 if looks else escape_mps
         )

@@ -76,6 +76,7 @@ class PlannerConfig(Section, frozen=True):
     `ais_max_age_s`: of what a vessel told of itself by AIS, to be counted where the camera does not look; 0: never.
     `min_depth_m`: water that an echo sounder finds shallower, or expects to be by how the bottom rises, is an obstacle;
     0: soundings do not count. One older than `sounding_max_age_s` does not.
+    `barred_s`: without headway along its path for so long, the desired course leads round what bars it; 0: never.
     `patience_s`: the longest that the boat waits for dynamic obstacles to pass.
     `person_near_m`, `vessel_near_m`: room kept free around dynamic obstacles. `lead_s`: candidates that come near where
     an obstacle will be so much later cost more, those that pass astern do not.
@@ -108,6 +109,7 @@ class PlannerConfig(Section, frozen=True):
     ais_max_age_s: NonNegative = 20.0  # a class A transponder speaks every 10 s, and one report may be lost
     min_depth_m: NonNegative = 0.6  # draught of 0.19 m, a common sounder's blind zone of 0.3 m, and a wave
     sounding_max_age_s: Positive = 2.0  # the slowest sounders speak once a second, and one sounding may be lost
+    barred_s: NonNegative = 8.0  # half of `patience_s`: what passes is waited for where no way leads round it
     patience_s: NonNegative = 15.0  # in which a swimmer at ease passes 6 m
     lead_s: NonNegative = 2.0
     person_near_m: NonNegative = 0.5  # half a swimmer, and what a stroke takes

@@ -53,6 +53,7 @@ PAPER: dict[str, object] = {
         "planner": {  # Q: a prototype beside the evaluated configuration
             "use": False,
             "hidden_s": 0.0,  # Q3
+            "barred_s": 0.0,
             "outvoted_by": 0,  # Q3
             "margin_m": 0.25,  # Q6
             "person_room_m": 0.0,  # Q6

@@ -16,6 +16,7 @@ from paani_services.navigator.avoidance.request import PlanRequest
 from paani_services.navigator.avoidance.rollout import RESIDUAL_DRIFT_MPS, BoatState, GuidanceSetpoint, Plan
 from paani_services.navigator.avoidance.verdicts import tell_headings
 from paani_services.navigator.mapping.ais_targets import AisTarget, locate_targets, predict_unseen_targets
+from paani_services.navigator.mapping.barriers import BarrierMemory, update_barriers
 from paani_services.navigator.mapping.observation import ObservationMemory, add_track_ids, update_memory
 from paani_services.navigator.mapping.observed_cells import CELL_M, Camera
 from paani_services.navigator.mapping.shallow_cells import CellNumbers, apply_shallow_cells, cells_on_grid
@@ -57,6 +58,7 @@ class PlannerState(
     waiting_since_us: since when no plan has led the boat onward.
     obstacle_track_ids: the advisor's tracks of the dynamic obstacles that the plan was made for.
     basis: what the plan was made from; None where another planner made it.
+    barriers: what stood in the water where the boat has been, in the frame of the memory.
     is_nobody_near: whether a recent picture showed the water then, and no person might be within `PERSON_NEAR_M`.
     """
 
@@ -71,6 +73,7 @@ class PlannerState(
     basis: PlanBasis | None = None
     is_nobody_near: bool = False
     soundings: SoundingMemory = SoundingMemory()
+    barriers: BarrierMemory = BarrierMemory()
 
 
 def observe(
@@ -86,7 +89,9 @@ def observe(
     """Add what is new to the planner's memory: odometry, evidence of another frame and its tracks, scan, sounding."""
     memory = update_memory(state.memory, odometry, evidence, config, scan)
     soundings = update_soundings(state.soundings, depth, memory, odometry, now_us, config)
-    return msgspec.structs.replace(state, memory=add_track_ids(memory, evidence, tracks), soundings=soundings)
+    barriers = state.barriers if memory.epoch == state.memory.epoch and memory.observations else BarrierMemory()
+    memory = add_track_ids(memory, evidence, tracks)
+    return msgspec.structs.replace(state, memory=memory, soundings=soundings, barriers=barriers)
 
 
 def replan(
@@ -140,6 +145,7 @@ def replan(
             basis if planner is None else None,
             request.grid.is_recent and request.nearest_person_m() >= PERSON_NEAR_M,
             state.soundings,
+            update_barriers(state.barriers, request.grid, now_us),
         )
     is_escape = state.basis is not None and plan.speed_mps > state.basis.speed_mps
     allowed_mps = max(setpoint.speed_mps, setpoint.escape_mps) if is_escape else setpoint.speed_mps
