@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Iterator
 
 import pytest
 
@@ -12,7 +13,7 @@ from paani_sim.eye.camera import BoatPose
 from paani_sim.worlds import Current
 from tests.scenario.test_closed_loop_drift import PERFECT
 from tests.scenario.test_closed_loop_guidance import Lockstep, open_water
-from tests.synthetic_water import CAMERA, Bar, distance_to_bar_m, evidence, water_edge_of
+from tests.synthetic_water import CAMERA, PLANNER, Bar, distance_to_bar_m, evidence, water_edge_of
 
 HULL_M = [(ahead, port) for ahead in (-0.55, 0.0, 0.55) for port in (-0.35, 0.0, 0.35)]  # points of it, from its middle
 DEAD_END: tuple[Bar, ...] = ((4.0, -4.0, 6.0, 4.0), (-3.0, 4.0, 6.0, 5.0), (-3.0, -5.0, 6.0, -4.0))
@@ -25,18 +26,14 @@ def gap_m(boat: BoatPose, bars: tuple[Bar, ...]) -> float:
     return min(distance_to_bar_m(x_m, y_m, bar) for x_m, y_m in points for bar in bars)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("toward_deg", [-45.0, 0.0, 45.0])
-def test_a_boat_in_a_dead_end_is_not_carried_on_to_what_bars_its_way(toward_deg: float) -> None:
-    """4 m from a wall with arms, 8 m apart, in 0.2 m/s of current; the boat without a path is kept where it is."""
+def sail_among(bars: tuple[Bar, ...], current: Current, seconds: float, *sets: str) -> Iterator[BoatPose]:
+    """The boat's poses, its start at the origin and heading 0, straight ahead along its path; the bars lie in its way."""
     lake = open_water("lake")
-    start = lake.start
-    current = Current(speed_mps=0.2, toward_rad=start.yaw_rad + math.radians(toward_deg))
-    boat = Lockstep(dataclasses.replace(lake, current=current), load_config(sets=PERFECT))
+    boat = Lockstep(dataclasses.replace(lake, current=current), load_config(sets=(*PERFECT, *sets)))
     boat.camera = CAMERA
-    (x0_m, y0_m), cos, sin = boat.plant.position_m, math.cos(start.yaw_rad), math.sin(start.yaw_rad)
-    least_m = math.inf
-    for number, _ in enumerate(boat.run(45.0)):
+    start, (x0_m, y0_m) = lake.start, boat.plant.position_m
+    cos, sin = math.cos(start.yaw_rad), math.sin(start.yaw_rad)
+    for number, _ in enumerate(boat.run(seconds)):
         x_m, y_m = boat.plant.position_m
         east_m, north_m = x_m - x0_m, y_m - y0_m
         assert boat.odometry is not None
@@ -44,7 +41,28 @@ def test_a_boat_in_a_dead_end_is_not_carried_on_to_what_bars_its_way(toward_deg:
             cos * east_m + sin * north_m, cos * north_m - sin * east_m, boat.odometry.yaw_rad - start.yaw_rad
         )
         if number % 2 == 0:
-            boat.evidence = evidence(boat.now_us, water_edge_of(here, DEAD_END))
-        least_m = min(least_m, gap_m(here, DEAD_END))
+            boat.evidence = evidence(boat.now_us, water_edge_of(here, bars))
+        yield here
     boat.plant.close()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("toward_deg", [-45.0, 0.0, 45.0])
+def test_a_boat_in_a_dead_end_is_not_carried_on_to_what_bars_its_way(toward_deg: float) -> None:
+    """4 m from a wall with arms, 8 m apart, in 0.2 m/s of current; the boat without a path is kept where it is."""
+    current = Current(speed_mps=0.2, toward_rad=open_water("lake").start.yaw_rad + math.radians(toward_deg))
+    poses = sail_among(DEAD_END, current, 45.0, "navigator.planner.barred_s=0.0")
+    assert min(gap_m(here, DEAD_END) for here in poses) > 0.2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("barred_s", [0.0, PLANNER.barred_s])
+def test_a_boat_finds_its_way_out_of_a_dead_end_and_round_it(barred_s: float) -> None:
+    """Within a minute: back first, past the end of an arm; without a way round it lies before the wall."""
+    least_m, farthest_m = math.inf, 0.0
+    for here in sail_among(DEAD_END, Current(), 60.0, f"navigator.planner.barred_s={barred_s}"):
+        least_m, farthest_m = min(least_m, gap_m(here, DEAD_END)), max(farthest_m, here.x_m)
+        if here.x_m > DEAD_END[0][2] + 2.0:
+            break
     assert least_m > 0.2
+    assert (farthest_m > DEAD_END[0][2] + 2.0) is (barred_s > 0.0)

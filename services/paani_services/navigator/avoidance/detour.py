@@ -6,6 +6,7 @@ planning", IEEE Transactions on Systems, Man, and Cybernetics, 1992), as the glo
 never seen counts as water, as the boat looks at it on the way.
 """
 
+import itertools
 import math
 from collections.abc import Sequence
 
@@ -34,15 +35,21 @@ _HERE: Cell = (_MIDDLE, _MIDDLE)
 def find_detour_rad(
     barriers: Barriers, here_m: Point, course_rad: float, path_m: Sequence[Point], config: PlannerConfig
 ) -> float | None:
-    """The course along the way round; None where the straight one is not barred, or no way round is known.
+    """The course along the way round; None where neither it nor the path is barred, or no way round is known.
 
     barriers: the square around the boat, which must reach `max_range_m`. path_m: points of the path ahead of the boat,
     in the order in which they are due, `AHEAD_SPACING_M` apart.
     """
     is_barred = _too_near(barriers, config)
-    if not _bars_line(is_barred, _ahead(course_rad, config.max_range_m)):
+    cells = [
+        (math.floor(y_m / BARRIER_CELL_M) - barriers.south, math.floor(x_m / BARRIER_CELL_M) - barriers.west)
+        for x_m, y_m in path_m
+    ]
+    cells = [each for each in cells if _is_inside(each)]
+    is_straight_barred = _bars_line(is_barred, _ahead(course_rad, config.max_range_m))
+    if not is_straight_barred and not any(is_barred[each] for each in cells):
         return None
-    row, column = _follow(_steps_to_path(is_barred, barriers, path_m), is_barred)
+    row, column = _follow(_steps_to_path(is_barred, cells), is_barred)
     if (row, column) == _HERE:
         return None
     east_m = (barriers.west + column + 0.5) * BARRIER_CELL_M - here_m[0]
@@ -59,19 +66,17 @@ def _too_near(barriers: Barriers, config: PlannerConfig) -> Bools:
     return np.asarray(np.where(alongside, barriers.is_barred, too_near))
 
 
-def _steps_to_path(is_barred: Bools, barriers: Barriers, path_m: Sequence[Point]) -> NDArray[np.int32]:
+def _steps_to_path(is_barred: Bools, path: Sequence[Cell]) -> NDArray[np.int32]:
     """How many steps each cell is from the path's far end, over unbarred water and along the path; -1: none or unknown.
 
-    It spreads from the far end, and from each point of the path when it could have come there along it, until it comes
-    to the boat: by edges and by corners in turn, which is an octagon.
+    It spreads from the far end that is not barred, and from each point of the path before it as far as none is, when it
+    could have come there along the path; until it comes to the boat. By edges and by corners in turn: an octagon.
     """
     steps, is_reached = np.full(is_barred.shape, -1, np.int32), is_barred.copy()
+    beyond = itertools.dropwhile(is_barred.__getitem__, reversed(path))
     due: dict[int, list[Cell]] = {}
-    for number, (x_m, y_m) in enumerate(reversed(path_m)):
-        row, column = math.floor(y_m / BARRIER_CELL_M), math.floor(x_m / BARRIER_CELL_M)
-        at = row - barriers.south, column - barriers.west
-        if _is_inside(at):
-            due.setdefault(round(number * AHEAD_SPACING_M / BARRIER_CELL_M), []).append(at)
+    for number, at in enumerate(itertools.takewhile(lambda at: not is_barred[at], beyond)):
+        due.setdefault(round(number * AHEAD_SPACING_M / BARRIER_CELL_M), []).append(at)
     front = np.zeros_like(is_barred)
     for step in range(4 * BARRIER_CELLS):
         front = _spread(front, by_corners=step % 2 == 0)
