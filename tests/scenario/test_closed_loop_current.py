@@ -27,7 +27,7 @@ def gap_m(boat: BoatPose, bars: tuple[Bar, ...]) -> float:
 
 
 def sail_among(bars: tuple[Bar, ...], current: Current, seconds: float, *sets: str) -> Iterator[BoatPose]:
-    """The boat's poses, its start at the origin and heading 0, straight ahead along its path; the bars lie in its way."""
+    """The boat's poses: it starts at the origin, heading 0, along a path straight ahead, on which the bars lie."""
     lake = open_water("lake")
     boat = Lockstep(dataclasses.replace(lake, current=current), load_config(sets=(*PERFECT, *sets)))
     boat.camera = CAMERA

@@ -114,7 +114,7 @@ def test_a_stopped_boat_does_not_drift_on_to_what_it_stopped_for(
 
 @pytest.mark.parametrize("to_the_bow_rad", [0.0, math.pi, 0.5 * math.pi], ids=["bow first", "stern first", "abeam"])
 def test_a_boat_that_stopped_under_way_notices_that_it_is_carried_slowly(to_the_bow_rad: float) -> None:
-    """0.04 m/s of current, by the simulator's receiver and IMU: it is kept within a metre for 90 s, not carried 3.6 m."""
+    """0.04 m/s of current, with the simulator's receiver and IMU: it is kept within a metre for 90 s."""
     lake = open_water("lake")
     current = Current(speed_mps=0.04, toward_rad=lake.start.yaw_rad + to_the_bow_rad)
     boat = Lockstep(dataclasses.replace(lake, current=current), load_config())

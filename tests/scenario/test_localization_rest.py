@@ -151,7 +151,7 @@ def test_rest_is_found_again_after_a_voyage() -> None:
 def test_after_a_voyage_rest_is_rest_in_the_water_that_carries_the_boat(
     drift_mps: float, imu_gap_s: float, seed: int
 ) -> None:
-    """Stopped in a current, it knows within half a metre how far it was carried in a minute; its IMU measures nothing."""
+    """Stopped in a current, it knows within half a metre how far that carried it in a minute, of which no IMU tells."""
     boat = wandering(seed)
     boat.sail(20.0)
     boat.sail(60.0, surge_mps=0.6)

@@ -151,9 +151,7 @@ def test_every_picture_in_use_is_projected_once_and_few_others_are_kept() -> Non
     lies_s=st.floats(0.0, PLANNER.hidden_s),
     steps_m=st.sampled_from([0.0, 0.02, 0.2]),
 )
-def test_each_side_is_remembered_as_it_was_looked_at_last(
-    yaws_rad: list[float], lies_s: float, steps_m: float
-) -> None:
+def test_each_side_is_remembered_as_it_was_looked_at_last(yaws_rad: list[float], lies_s: float, steps_m: float) -> None:
     """By a boat that lies still or makes little way; and what a plan costs does not grow with how long it lies."""
     memory, at_us, seen_from = ObservationMemory(), START_US, []
     edge = water_edge_of(AT_REST)
