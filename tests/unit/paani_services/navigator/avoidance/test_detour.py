@@ -109,3 +109,21 @@ def test_a_gap_counts_as_a_way_where_hull_and_margin_fit(gap_m: float) -> None:
         assert math.cos(detour_rad) < 0.0
     else:
         assert detour_rad is None
+
+
+@pytest.mark.parametrize("is_mirrored", [False, True])
+def test_of_two_gaps_the_nearer_is_taken(is_mirrored: bool) -> None:
+    """Both within 45 degrees of the course: a way is as long as it is, not as its longer side."""
+    walls = [(6.0, 3.6, 7.0, 20.0), (6.0, -4.6, 7.0, 1.4), (6.0, -20.0, 7.0, -6.8)]
+    bars = [turned(bar, 0, is_mirrored) for bar in walls]
+    detour_rad = find_detour_rad(square_around(0j, bars), (0.2, 0.2), 0.0, AHEAD, PLANNER)
+    assert detour_rad is not None
+    assert (detour_rad < 0.0) is is_mirrored
+
+
+def test_what_bars_the_path_farther_off_than_the_camera_sees_is_gone_round_too() -> None:
+    """A boat that was there remembers it."""
+    wall = square_around(0j, [(PLANNER.max_range_m + 4.0, -6.0, PLANNER.max_range_m + 5.0, 3.0)])
+    detour_rad = find_detour_rad(wall, (0.1, 0.1), 0.0, AHEAD, PLANNER)
+    assert detour_rad is not None
+    assert 0.0 < detour_rad < math.pi / 2.0
