@@ -17,7 +17,12 @@ from paani_services.navigator.avoidance.rollout import RESIDUAL_DRIFT_MPS, BoatS
 from paani_services.navigator.avoidance.verdicts import tell_headings
 from paani_services.navigator.mapping.ais_targets import AisTarget, locate_targets, predict_unseen_targets
 from paani_services.navigator.mapping.barriers import BarrierMemory, update_barriers
-from paani_services.navigator.mapping.observation import ObservationMemory, add_track_ids, update_memory
+from paani_services.navigator.mapping.observation import (
+    ObservationMemory,
+    add_track_ids,
+    begins_anew,
+    update_memory,
+)
 from paani_services.navigator.mapping.observed_cells import CELL_M, Camera
 from paani_services.navigator.mapping.shallow_cells import CellNumbers, apply_shallow_cells, cells_on_grid
 from paani_services.navigator.mapping.soundings import SoundingMemory, update_soundings
@@ -89,7 +94,7 @@ def observe(
     """Add what is new to the planner's memory: odometry, evidence of another frame and its tracks, scan, sounding."""
     memory = update_memory(state.memory, odometry, evidence, config, scan)
     soundings = update_soundings(state.soundings, depth, memory, odometry, now_us, config)
-    barriers = state.barriers if memory.epoch == state.memory.epoch and memory.observations else BarrierMemory()
+    barriers = BarrierMemory() if begins_anew(memory, state.memory) else state.barriers
     memory = add_track_ids(memory, evidence, tracks)
     return msgspec.structs.replace(state, memory=memory, soundings=soundings, barriers=barriers)
 

@@ -45,7 +45,6 @@ def update_barriers(memory: BarrierMemory, grid: OccupancyGrid, now_us: int) -> 
     left, low = -column % SPLIT, -row % SPLIT
     count = (GRID_CELLS - SPLIT + 1) // SPLIT
     west, south = (column + left) // SPLIT, (row + low) // SPLIT
-
     shape = count, SPLIT, count, SPLIT
     part = slice(low, low + SPLIT * count), slice(left, left + SPLIT * count)
     stands = np.any((grid.occupied & ~grid.possible_people)[part].reshape(shape), axis=(1, 3))

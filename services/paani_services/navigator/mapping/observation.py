@@ -147,6 +147,11 @@ def update_memory(
     )
 
 
+def begins_anew(memory: ObservationMemory, before: ObservationMemory) -> bool:
+    """Whether dead reckoning began anew since the memory before: places of that one lie elsewhere in this one."""
+    return not memory.poses or memory.poses[0] not in before.poses
+
+
 def is_free_space_evidence(evidence: Evidence) -> bool:
     """Whether evidence may free cells: a live, usable picture, segmented by the trained network (F2)."""
     return (

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from paani_services.navigator.avoidance.replanning import PlannerState, observe
 from paani_services.navigator.mapping.barriers import (
     BARRIER_CELL_M,
     BARRIER_CELLS,
@@ -17,7 +19,16 @@ from paani_services.navigator.mapping.barriers import (
 )
 from paani_services.navigator.mapping.observed_cells import CELL_M
 from paani_services.navigator.mapping.occupancy_grid import GRID_CELLS, OccupancyGrid
-from tests.synthetic_water import START_US, open_water
+from tests.synthetic_water import (
+    AT_REST,
+    PLANNER,
+    START_US,
+    evidence,
+    observe_from,
+    odometry,
+    open_water,
+    water_edge_of,
+)
 
 CORNERS = st.tuples(st.integers(-70, 70), st.integers(-70, 70))  # of grids, in cells
 
@@ -75,6 +86,22 @@ def test_what_is_far_off_or_old_is_forgotten_and_what_is_seen_again_is_not() -> 
     assert len(again.cells) == len(memory.cells)
     away = unseen._replace(west_m=BARRIER_CELLS * BARRIER_CELL_M)
     assert update_barriers(memory, away, START_US + 1_000_000).cells == b""
+
+
+@pytest.mark.parametrize(("step_us", "epochs", "is_kept"), [(50_000, 0, True), (700_000, 0, False), (50_000, 1, False)])
+def test_barriers_go_where_dead_reckoning_begins_anew(step_us: int, epochs: int, is_kept: bool) -> None:
+    """After a gap, or another run of the estimator, with a new picture in the same step too."""
+    barriers = update_barriers(BarrierMemory(), grid_with((-50, -50), (10, 10)), START_US)
+    state = PlannerState(observe_from(), barriers=barriers)
+    for number in range(1, 31):
+        now_us = START_US + 50_000 * number
+        state = observe(state, odometry(now_us, AT_REST), evidence(now_us, water_edge_of(AT_REST)), PLANNER)
+    assert state.barriers == barriers
+    now_us += step_us
+    here = odometry(now_us, AT_REST)
+    here = msgspec.structs.replace(here, epoch=here.epoch + epochs)
+    state = observe(state, here, evidence(now_us, water_edge_of(AT_REST)), PLANNER)
+    assert state.barriers == (barriers if is_kept else BarrierMemory())
 
 
 @pytest.mark.parametrize("is_person", [False, True])
