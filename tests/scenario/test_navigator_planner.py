@@ -53,6 +53,7 @@ class Pool:
         self.bars, self.bank_m, self.boat, self.camera = bars, bank_m, boat, camera
         self.state, self.now_us, self.speed_mps = NavigatorState(), START_US, 0.0
         self.direction, self.looks, self.shut_in = Direction.STRAIGHT, True, False
+        self.config = CONFIG
         self.order: NavCommand | None = None
         self.newest_evidence: Evidence | None = None
 
@@ -68,7 +69,7 @@ class Pool:
             )
             heard = self.heard(advisory, odometry(self.now_us, self.boat, self.speed_mps))
             self.state, self.order = navigate(
-                self.state, heard, mission_of_route(EAST), self.now_us, 43, CONFIG, self.camera
+                self.state, heard, mission_of_route(EAST), self.now_us, 43, self.config, self.camera
             )
             yield self.order
 
@@ -244,7 +245,9 @@ def test_a_boat_before_a_wall_turns_along_it() -> None:
 
 
 def test_a_boat_waits_in_a_dead_end_until_it_opens() -> None:
+    """It looks for no way round it here."""
     pool = Pool((4.0, -30.0, 5.0, 30.0))
+    pool.config = msgspec.structs.replace(CONFIG, planner=msgspec.structs.replace(CONFIG.planner, barred_s=0.0))
     last = pool.settle(50.0)  # it sails along the bar first, slowly
     assert last.halt_reasons == (Inhibit.NO_FREE_PATH,)
     assert pool.gap_m() > 0.6

@@ -162,7 +162,11 @@ def navigate(
         # The planner weighs the advised side against what the map shows.
         # It turns as slowly as every advised turn is, but for one out of the way of what comes to the boat.
         looks = is_turn_to_look(advisory)
-        detour_rad = course_round_rad(state.planner_state, state.headway, setpoint, odometry, now_us, config.planner)
+        detour_rad = None
+        if not looks:
+            detour_rad = course_round_rad(
+                state.planner_state, state.headway, setpoint, odometry, now_us, config.planner
+            )
         if detour_rad is not None:
             heading_rad, leg = detour_rad, f"{leg}, by a way round what bars it"
         planner_setpoint = GuidanceSetpoint(

@@ -17,7 +17,6 @@ from paani import portable
 from paani.arrays import Bools
 from paani.config import PlannerConfig
 from paani.fence_geometry import Point
-from paani_services.navigator.guidance.headway import AHEAD_SPACING_M
 from paani_services.navigator.mapping.barriers import BARRIER_CELL_M, BARRIER_CELLS, Barriers
 from paani_services.navigator.mapping.distance_field import distance_field_m
 from paani_services.navigator.mapping.observed_cells import CELL_M
@@ -38,7 +37,7 @@ def find_detour_rad(
     """The course along the way round; None where neither it nor the path is barred, or no way round is known.
 
     barriers: the square around the boat, which must reach `max_range_m`. path_m: points of the path ahead of the boat,
-    in the order in which they are due, `AHEAD_SPACING_M` apart.
+    in the order in which they are due.
     """
     is_barred = _too_near(barriers, config)
     cells = [
@@ -67,26 +66,23 @@ def _too_near(barriers: Barriers, config: PlannerConfig) -> Bools:
 
 
 def _steps_to_path(is_barred: Bools, path: Sequence[Cell]) -> NDArray[np.int32]:
-    """How many steps each cell is from the path's far end, over unbarred water and along the path; -1: none or unknown.
+    """How many steps each cell is over unbarred water from the path beyond what first bars it; -1: none or unknown.
 
-    It spreads from the far end that is not barred, and from each point of the path before it as far as none is, when it
-    could have come there along the path; until it comes to the boat. By edges and by corners in turn: an octagon.
+    It spreads from that stretch of the path, up to what bars it next, until it comes to the boat: the boat rejoins its
+    path where it is nearest, and cuts no corner. By edges and by corners in turn: an octagon.
     """
     steps, is_reached = np.full(is_barred.shape, -1, np.int32), is_barred.copy()
-    beyond = itertools.dropwhile(is_barred.__getitem__, reversed(path))
-    due: dict[int, list[Cell]] = {}
-    for number, at in enumerate(itertools.takewhile(lambda at: not is_barred[at], beyond)):
-        due.setdefault(round(number * AHEAD_SPACING_M / BARRIER_CELL_M), []).append(at)
+    first = next((number for number, at in enumerate(path) if is_barred[at]), 0)
+    beyond = itertools.dropwhile(is_barred.__getitem__, path[first:])
     front = np.zeros_like(is_barred)
+    for at in itertools.takewhile(lambda at: not is_barred[at], beyond):
+        front[at] = True
     for step in range(4 * BARRIER_CELLS):
-        front = _spread(front, by_corners=step % 2 == 0)
-        for at in due.get(step, ()):
-            front[at] = True
-        front &= ~is_reached
         steps[front] = step
         is_reached |= front
         if front[_HERE]:
             break
+        front = _spread(front, by_corners=step % 2 == 1) & ~is_reached
     return steps
 
 
