@@ -92,9 +92,9 @@ def test_what_is_far_off_or_old_is_forgotten_and_what_is_seen_again_is_not() -> 
 def test_barriers_go_where_dead_reckoning_begins_anew(step_us: int, epochs: int, is_kept: bool) -> None:
     """After a gap, or another run of the estimator, with a new picture in the same step too."""
     barriers = update_barriers(BarrierMemory(), grid_with((-50, -50), (10, 10)), START_US)
-    state = PlannerState(observe_from(), barriers=barriers)
-    for number in range(1, 31):
-        now_us = START_US + 50_000 * number
+    state, now_us = PlannerState(observe_from(), barriers=barriers), START_US
+    for _ in range(30):
+        now_us += 50_000
         state = observe(state, odometry(now_us, AT_REST), evidence(now_us, water_edge_of(AT_REST)), PLANNER)
     assert state.barriers == barriers
     now_us += step_us
