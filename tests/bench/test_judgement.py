@@ -75,9 +75,9 @@ def test_dithering_counts_other_settings_on_what_was_recorded() -> None:
     """A drive whose camera went black changes as its log says; the paper, which checks no picture, otherwise."""
     path = ROOT / "tests" / "replay" / "river_camera_black.mcap"
     rows = {str(row[1]): row for row in steadiness([path]).rows}
-    assert info_of(open_log(path)).direction_changes_per_min == 10.0
-    assert (rows["as recorded"][2], rows["as recorded"][3]) == (30, 5)
-    assert rows["paper"][3] != 5
+    assert info_of(open_log(path)).direction_changes_per_min == 8.0
+    assert (rows["as recorded"][2], rows["as recorded"][3]) == (30, 4)
+    assert rows["paper"][3] != 4
 
 
 def test_dithering_needs_steps_to_decide_again(tmp_path: Path) -> None:
