@@ -127,3 +127,13 @@ def test_what_bars_the_path_farther_off_than_the_camera_sees_is_gone_round_too()
     detour_rad = find_detour_rad(wall, (0.1, 0.1), 0.0, AHEAD, PLANNER)
     assert detour_rad is not None
     assert 0.0 < detour_rad < math.pi / 2.0
+
+
+def test_a_path_that_comes_back_beside_the_boat_is_not_cut_short() -> None:
+    """It is rejoined beyond what bars it first, not where it comes by again."""
+    there = [*((float(k), 0.0) for k in range(10)), *((9.0, float(k)) for k in range(1, 3))]
+    back = [(9.0 - k, 3.0) for k in range(10)]
+    wall = square_around(0j, [(4.0, -3.5, 5.0, 6.0)])
+    detour_rad = find_detour_rad(wall, (0.1, 0.1), 0.0, [*there, *back], PLANNER)
+    assert detour_rad is not None
+    assert -math.pi / 2.0 < detour_rad < 0.0
