@@ -32,7 +32,7 @@ from paani_services.navigator.avoidance.replanning import (
     replan,
 )
 from paani_services.navigator.avoidance.rollout import GuidanceSetpoint
-from paani_services.navigator.guidance.headway import Headway, note_headway
+from paani_services.navigator.guidance.headway import Headway, is_barred, note_headway
 from paani_services.navigator.guidance.ilos import IlosState, hold_integral, integrate
 from paani_services.navigator.guidance.mission_progress import (
     LegSetpoint,
@@ -138,7 +138,7 @@ def navigate(
     if not is_allowed(mission.bounds, position_m) and not config.fence_return:
         inhibits.append(Inhibit.OUTSIDE_FENCE)
     leg, cross_m = describe_leg(state.progress, mission), setpoint.cross_track_m
-    headway = Headway() if inhibits and inhibits != [Inhibit.ADVISED_STOP] else state.headway
+    headway = Headway() if _is_more_than_advice(inhibits) else state.headway
     headway = note_headway(headway, setpoint, state.progress.waypoints_reached, position_m, now_us)
     state = msgspec.structs.replace(state, headway=headway)
     if inhibits:
@@ -162,13 +162,10 @@ def navigate(
         # The planner weighs the advised side against what the map shows.
         # It turns as slowly as every advised turn is, but for one out of the way of what comes to the boat.
         looks = is_turn_to_look(advisory)
-        detour_rad = None
-        if not looks:
-            detour_rad = course_round_rad(
-                state.planner_state, state.headway, setpoint, odometry, now_us, config.planner
-            )
-        if detour_rad is not None:
-            heading_rad, leg = detour_rad, f"{leg}, by a way round what bars it"
+        if is_barred(state.headway, now_us, config.planner) and not looks:
+            detour_rad = course_round_rad(state.planner_state, setpoint, odometry, config.planner)
+            if detour_rad is not None:
+                heading_rad, leg = detour_rad, f"{leg}, by a way round what bars it"
         planner_setpoint = GuidanceSetpoint(
             heading_rad, speed_mps, TURN_SIDE.get(direction, 0.0), looks, 0.0 if looks else escape_mps
         )
@@ -204,7 +201,7 @@ def begin_step(
     """What every mode begins with: the state with what this step shows, and what about the inputs forbids motion."""
     state = note_clock_advance(state, inputs, now_us)
     inhibits = find_inhibits(inputs, state.clock_advanced_us, now_us, domain, config)
-    if inhibits and inhibits != [Inhibit.ADVISED_STOP]:
+    if _is_more_than_advice(inhibits):
         state = msgspec.structs.replace(state, station=None)  # it lies by dead reckoning, which may have begun anew
     state = _end_visual_turn(state, inputs)
     if config.planner.acts_on(camera.calibration):
@@ -220,6 +217,11 @@ def begin_step(
         )
         state = msgspec.structs.replace(state, planner_state=planner_state)
     return state, inhibits
+
+
+def _is_more_than_advice(inhibits: list[Inhibit]) -> bool:
+    """Whether anything but a STOP of the advice forbids motion."""
+    return bool(inhibits) and inhibits != [Inhibit.ADVISED_STOP]
 
 
 def _keep_station(

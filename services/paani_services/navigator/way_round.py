@@ -4,22 +4,17 @@ from paani.config import PlannerConfig
 from paani.messages import Odometry
 from paani_services.navigator.avoidance.detour import REACH_M, find_detour_rad
 from paani_services.navigator.avoidance.replanning import PlannerState
-from paani_services.navigator.guidance.headway import Headway, is_barred, path_ahead_m
+from paani_services.navigator.guidance.headway import path_ahead_m
 from paani_services.navigator.guidance.mission_progress import LegSetpoint
 from paani_services.navigator.mapping.barriers import barriers_around
 
 
 def course_round_rad(
-    state: PlannerState,
-    headway: Headway,
-    setpoint: LegSetpoint,
-    odometry: Odometry,
-    now_us: int,
-    config: PlannerConfig,
+    state: PlannerState, setpoint: LegSetpoint, odometry: Odometry, config: PlannerConfig
 ) -> float | None:
-    """The course; None while the boat makes headway, or where nothing that it remembers bars its path."""
+    """The course; None where nothing that the boat remembers bars its path, or no way round is known."""
     here = state.memory.odom_pose
-    if here is None or not is_barred(headway, now_us, config):
+    if here is None:
         return None
     off_x_m, off_y_m = odometry.x_m - here.x_m, odometry.y_m - here.y_m  # of the map against dead reckoning
     path_m = path_ahead_m(setpoint, (odometry.x_m, odometry.y_m), REACH_M)

@@ -36,7 +36,7 @@ def find_detour_rad(
 ) -> float | None:
     """The course along the way round; None where neither it nor the path is barred, or no way round is known.
 
-    barriers: the square around the boat, which must reach `max_range_m`. path_m: points of the path ahead of the boat,
+    barriers: the square around the boat. path_m: points of the path ahead of the boat,
     in the order in which they are due.
     """
     is_barred = _too_near(barriers, config)
@@ -45,7 +45,7 @@ def find_detour_rad(
         for x_m, y_m in path_m
     ]
     cells = [each for each in cells if _is_inside(each)]
-    is_straight_barred = _bars_line(is_barred, _ahead(course_rad, config.max_range_m))
+    is_straight_barred = _bars_line(is_barred, _ahead(course_rad, min(config.max_range_m, REACH_M)))
     if not is_straight_barred and not any(is_barred[each] for each in cells):
         return None
     row, column = _follow(_steps_to_path(is_barred, cells), is_barred)

@@ -323,16 +323,13 @@ def _prune_observations(observations: tuple[Observation, ...], config: PlannerCo
     last_us = -BOX_SPACING_US
     for observation in observations:
         age_s = (newest_us - observation.stamp_us) * 1e-6
+        is_apart = observation.stamp_us - last_us >= BOX_SPACING_US
         if age_s <= config.occupied_s:
             kept.append(observation)
         elif observation.stamp_us in views:
             kept.append(observation)
             last_us = observation.stamp_us
-        elif (
-            age_s <= config.fit_s + config.unseen_s
-            and observation.boxes
-            and observation.stamp_us - last_us >= BOX_SPACING_US
-        ):
+        elif age_s <= config.fit_s + config.unseen_s and observation.boxes and is_apart:
             is_bare = not observation.water_edge and not observation.feet  # the same object stays: its hash is kept
             kept.append(observation if is_bare else msgspec.structs.replace(observation, water_edge=b"", feet=()))
             last_us = observation.stamp_us

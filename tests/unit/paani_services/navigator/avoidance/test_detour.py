@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -48,6 +49,7 @@ def distance_m(at_m: complex, bars: list[Bar]) -> float:
     return min(map(abs, off))
 
 
+@pytest.mark.slow
 @settings(max_examples=15, deadline=None)
 @given(
     name=st.sampled_from(sorted(POCKETS)),
@@ -87,6 +89,14 @@ AHEAD = [(AHEAD_SPACING_M * k, 0.0) for k in range(round(REACH_M) + 1)]
 def test_open_water_needs_none(aside_m: float) -> None:
     beside = square_around(0j, [(-5.0, aside_m, 12.0, aside_m + 1.0)])
     assert find_detour_rad(beside, (0.1, 0.1), 0.0, AHEAD, PLANNER) is None
+    abeam = [(x_m, y_m - 3.0) for x_m, y_m in AHEAD]  # the line of sight leads back to it, ahead
+    assert find_detour_rad(beside, (0.1, 0.1), 0.0, abeam, PLANNER) is None
+
+
+@pytest.mark.parametrize("course_deg", [0.0, 45.0, 180.0])
+def test_a_camera_that_sees_beyond_the_square_needs_no_more_of_it(course_deg: float) -> None:
+    far = msgspec.structs.replace(PLANNER, max_range_m=60.0)
+    assert find_detour_rad(square_around(0j, []), (0.1, 0.1), math.radians(course_deg), AHEAD, far) is None
 
 
 def test_a_boat_walled_in_is_led_nowhere() -> None:

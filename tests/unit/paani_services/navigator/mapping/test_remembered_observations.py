@@ -145,6 +145,7 @@ def test_every_picture_in_use_is_projected_once_and_few_others_are_kept() -> Non
     assert made.maxsize <= 2 * len(memory.observations)
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(
     yaws_rad=st.lists(st.floats(-math.pi, math.pi), min_size=1, max_size=12),
