@@ -31,7 +31,7 @@ from tests.transcript import Transcript
 
 ALONE = {"bench", "browser", "deploy", "fault", "firmware", "integration", "link"}  # folders
 RESULTS_ALONE = {
-    "bench": "board bridge chain eyes fleet judgement recorder soak",
+    "bench": "board bridge chain fleet judgement recorder soak",
     "browser": """
         camera_labels devices_tab exposed_page fleet_page heading_verdicts health_tab indicator_strip installed
         legibility map_objects map_projection map_tiles mission_cells models_report recording_chip recordings_tab

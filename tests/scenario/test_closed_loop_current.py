@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import math
 from collections.abc import Iterator
@@ -33,17 +34,17 @@ def sail_among(bars: tuple[Bar, ...], current: Current, seconds: float, *sets: s
     boat.camera = CAMERA
     start, (x0_m, y0_m) = lake.start, boat.plant.position_m
     cos, sin = math.cos(start.yaw_rad), math.sin(start.yaw_rad)
-    for number, _ in enumerate(boat.run(seconds)):
-        x_m, y_m = boat.plant.position_m
-        east_m, north_m = x_m - x0_m, y_m - y0_m
-        assert boat.odometry is not None
-        here = BoatPose(
-            cos * east_m + sin * north_m, cos * north_m - sin * east_m, boat.odometry.yaw_rad - start.yaw_rad
-        )
-        if number % 2 == 0:
-            boat.evidence = evidence(boat.now_us, water_edge_of(here, bars))
-        yield here, "" if boat.command is None else boat.command.leg
-    boat.plant.close()
+    with contextlib.closing(boat.plant):
+        for number, _ in enumerate(boat.run(seconds)):
+            x_m, y_m = boat.plant.position_m
+            east_m, north_m = x_m - x0_m, y_m - y0_m
+            assert boat.odometry is not None
+            here = BoatPose(
+                cos * east_m + sin * north_m, cos * north_m - sin * east_m, boat.odometry.yaw_rad - start.yaw_rad
+            )
+            if number % 2 == 0:
+                boat.evidence = evidence(boat.now_us, water_edge_of(here, bars))
+            yield here, "" if boat.command is None else boat.command.leg
 
 
 @pytest.mark.slow

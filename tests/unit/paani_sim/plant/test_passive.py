@@ -16,7 +16,10 @@ XML = """
 
 
 @pytest.fixture(autouse=True)
-def clean_hook() -> Iterator[None]:
+def clean_hook(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """No force of another test's plant, which lies open where that test failed."""
+    monkeypatch.setattr(passive, "_forces", [])
+    mujoco.set_mjcb_passive(None)
     yield
     mujoco.set_mjcb_passive(None)
 
