@@ -28,7 +28,7 @@ run: setup ## start the whole loop on the river world
 	$(PAANI) up $(ARGS)
 
 test: setup-test system-firmware system-deploy lint ## everything that CI runs
-	$(BIN)/python -m pytest -q -n 4 --durations=20 tests -m "not long"
+	$(BIN)/python -m pytest -q -n 3 --durations=20 tests -m "not long"
 
 test-long: setup-test ## what takes hours: the standard suite of trials, tests marked `long`; interrupted, the same command goes on
 	@mkdir -p runs

@@ -31,14 +31,14 @@ from tests.transcript import Transcript
 
 ALONE = {"bench", "browser", "deploy", "fault", "firmware", "integration", "link"}  # folders
 RESULTS_ALONE = {
-    "bench": "board bridge chain fleet judgement recorder soak",
+    "bench": "board chain fleet judgement recorder soak",
     "browser": """
         camera_labels devices_tab exposed_page fleet_page heading_verdicts health_tab indicator_strip installed
         legibility map_objects map_projection map_tiles mission_cells models_report recording_chip recordings_tab
         replay_page route_editor sensor_strip sizes tabs time tuning_strip
     """,
     "integration": """
-        authority_matrix certificates claims_check cluster docs doctor examples fleet foxglove graphs inspect mavlink
+        certificates claims_check cluster docs doctor examples fleet foxglove graphs inspect mavlink
         package replay ros2 stuck_detection trials up up_offline up_record
     """,
 }  # by folder, the files that wait for results and do not watch the clock
@@ -46,7 +46,7 @@ BESIDE = {f"tests/{folder}/test_{name}.py" for folder, names in RESULTS_ALONE.it
 SOAK = "tests/bench/test_soak.py"  # first, as it sits out its minutes and hardly computes; it yields to nothing
 STOPS_THE_BOAT = {"fault", "link"}  # folders
 WORKER = "PYTEST_XDIST_WORKER" in os.environ  # other tests run at the same time
-NICENESS = 5  # three workers that compute leave more than half of two cores to the one that watches the clock
+NICENESS = 5  # workers that compute leave more than half of two cores to the one that watches the clock
 MAX_REASON_CHARACTERS = 300
 
 settings.register_profile("quick", max_examples=15, deadline=None)  # for `make check`; everything else tries more

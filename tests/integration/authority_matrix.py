@@ -11,7 +11,7 @@ import sys
 import tempfile
 import threading
 from collections import Counter, defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Sized
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -28,8 +28,9 @@ from paani.link_access import LINK
 from paani_tools.certs.folder import make
 from tests.conftest import find_free_port
 
-SETTLE_S = 1.0
-ANSWER_S = 1.0
+SETTLE_S = 2.5  # in which a router on a busy machine knows of what was declared
+ANSWER_S = 6.0
+QUIET_S = 1.0
 WILDCARDS = ("**", "paani/**", "paani/*/*/**", "{prefix}/**", "{prefix}/*/*", "{prefix}/@truth/*", "{prefix}/@truth/**")
 
 
@@ -120,7 +121,7 @@ class _Trial:
             for key in (*wildcards, *self._keys()):
                 session.put(key, b"tried", attachment=writer, **options)
                 session.delete(key, attachment=writer, **options)
-        _wait(SETTLE_S)
+        _wait_until_quiet(samples)
         for subscriber in subscribers:
             subscriber.undeclare()  # type: ignore[no-untyped-call]  # zenoh's stubs
         heard: dict[tuple[str, str], set[tuple[str, str]]] = defaultdict(set)
@@ -168,7 +169,7 @@ class _Trial:
                 )
                 asked += 1
         for _ in range(asked):
-            assert pending.acquire(timeout=10.0), "a question does not end"
+            assert pending.acquire(timeout=2.0 * ANSWER_S), "a question does not end"
         for queryable in offered:
             queryable.undeclare()  # type: ignore[no-untyped-call]  # zenoh's stubs
         return dict(answers), len(wide)
@@ -218,6 +219,14 @@ def _closing(session: zenoh.Session) -> Iterator[zenoh.Session]:
 
 def _wait(seconds: float) -> None:
     threading.Event().wait(seconds)
+
+
+def _wait_until_quiet(samples: Sized) -> None:
+    """Until nothing has come for a while."""
+    came = -1
+    while len(samples) > came:
+        came = len(samples)
+        _wait(QUIET_S)
 
 
 def table(matrix: Matrix) -> str:

@@ -60,7 +60,7 @@ def test_drives_in_processes_are_those_in_this_one(tmp_path: Path) -> None:
     assert second.stdout == first.stdout
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
 def test_an_interrupted_run_is_gone_on_with(tmp_path: Path, number: signal.Signals) -> None:
     """Ctrl-C or a kill: what is done stays and is summed up, the processes end, and the line says how to go on."""
     handler = signal.signal(signal.SIGINT, signal.SIG_DFL)  # a shell in the background ignores it, and so would a child

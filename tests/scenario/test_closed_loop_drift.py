@@ -96,8 +96,17 @@ def farthest_while_stopped_m(world: World, stop: Callable[[Lockstep], Inhibit], 
     return farthest_m
 
 
-@pytest.mark.parametrize("to_the_bow_rad", [0.0, math.pi, 0.5 * math.pi], ids=["bow first", "stern first", "abeam"])
-@pytest.mark.parametrize("stop", [stop_by_the_advice, stop_by_the_planner])
+@pytest.mark.parametrize(
+    ("stop", "to_the_bow_rad"),
+    [
+        pytest.param(stop_by_the_advice, 0.0, id="advice, bow first"),
+        pytest.param(stop_by_the_advice, math.pi, id="advice, stern first", marks=pytest.mark.long),
+        pytest.param(stop_by_the_advice, 0.5 * math.pi, id="advice, abeam"),
+        pytest.param(stop_by_the_planner, 0.0, id="planner, bow first", marks=pytest.mark.long),
+        pytest.param(stop_by_the_planner, math.pi, id="planner, stern first"),
+        pytest.param(stop_by_the_planner, 0.5 * math.pi, id="planner, abeam", marks=pytest.mark.long),
+    ],
+)
 def test_a_stopped_boat_does_not_drift_on_to_what_it_stopped_for(
     stop: Callable[[Lockstep], Inhibit], to_the_bow_rad: float
 ) -> None:

@@ -49,7 +49,9 @@ def scaled_drag(vessel: str) -> str:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("vessel", "seed", "quadratic_n"), [("paper", 1, 0.0), ("otter", 2, 80.0)])
+@pytest.mark.parametrize(
+    ("vessel", "seed", "quadratic_n"), [("paper", 1, 0.0), pytest.param("otter", 2, 80.0, marks=pytest.mark.long)]
+)
 def test_w11_a_known_hull_is_found_within_the_stated_intervals(
     vessel: str, seed: int, quadratic_n: float, tmp_path: Path
 ) -> None:
@@ -103,7 +105,9 @@ def test_a_recording_becomes_a_vessel_and_settings(
 @pytest.mark.parametrize(
     ("levels", "lacking"),
     [
-        (STEADY, {"surge_linear", "surge_quadratic", "yaw_quadratic", "yaw_inertia"}),
+        pytest.param(
+            STEADY, {"surge_linear", "surge_quadratic", "yaw_quadratic", "yaw_inertia"}, marks=pytest.mark.long
+        ),
         (STRAIGHT, {"surge_quadratic", "yaw_linear", "yaw_quadratic", "yaw_inertia"}),
     ],
 )

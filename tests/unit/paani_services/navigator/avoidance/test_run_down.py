@@ -138,6 +138,7 @@ def test_what_drifts_up_to_a_boat_is_left_faster_than_an_advised_turn(bearing_de
     assert escape_from(drifting, RESTING, turning).least_m < 0.1
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_fewer_strike_who_leaves_faster_than_its_course() -> None:
     """Known 4 s before, of vessels from five bearings at four speeds: 19 of 40 strike at 0.6 m/s, and 14 at 0.9."""
