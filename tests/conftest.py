@@ -31,15 +31,15 @@ from tests.transcript import Transcript
 
 ALONE = {"bench", "browser", "deploy", "fault", "firmware", "integration", "link"}  # folders
 RESULTS_ALONE = {
-    "bench": "board chain fleet judgement recorder soak",
+    "bench": "board chain fleet judgement soak",
     "browser": """
         camera_labels devices_tab exposed_page fleet_page heading_verdicts health_tab indicator_strip installed
         legibility map_objects map_projection map_tiles mission_cells models_report recording_chip recordings_tab
         replay_page route_editor sensor_strip sizes tabs time tuning_strip
     """,
     "integration": """
-        certificates claims_check cluster docs doctor examples fleet foxglove graphs inspect mavlink
-        package replay ros2 stuck_detection trials up up_offline up_record
+        certificates claims_check cluster docs doctor examples fleet graphs inspect mavlink package
+        replay stuck_detection trials up up_offline up_record
     """,
 }  # by folder, the files that wait for results and do not watch the clock
 BESIDE = {f"tests/{folder}/test_{name}.py" for folder, names in RESULTS_ALONE.items() for name in names.split()}
