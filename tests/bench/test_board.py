@@ -62,8 +62,8 @@ def test_twelve_polls_of_the_papers_loop(tmp_path: Path, private_sets: tuple[str
     span_s = (polls[-1].at_us - polls[0].at_us) * 1e-6
     assert span_s > 10.9
     assert 3 <= len(results) == figures["distinct_results"] <= 0.5 * span_s + 2.0
-    assert 0.2 < figures["cadence_hz"] < 1.0  # few results, some of which waited for a processor
-    assert 0.2 < figures["captured_hz"] < 1.0
+    assert 0.2 < figures["cadence_hz"] < 0.7
+    assert 0.2 < figures["captured_hz"] < 0.7
     assert figures["stale"] == sum(is_stale(status) for status in answers)
     assert run["profile"] == "paper"
     for name in ("pipeline_ms", "detector_ms", "segmenter_run_ms", "frame_age_s"):

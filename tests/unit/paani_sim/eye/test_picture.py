@@ -185,10 +185,8 @@ def test_actors_are_drawn_where_the_plant_says(eye: Eye, river: World) -> None:
         eye.render(pose, 40.0, by_time[:1])
 
 
-@pytest.mark.parametrize(
-    ("supersample", "first_row", "roll_rad", "pitch_rad"),
-    [(1.0, 115, 0.06, -0.03), (1.25, 125, 0.0, 0.0), (1.5, 125, 0.06, -0.03)],
-)
+@pytest.mark.parametrize(("supersample", "first_row"), [(1.0, 115), (1.25, 125), (1.5, 125)])
+@pytest.mark.parametrize(("roll_rad", "pitch_rad"), [pytest.param(0.0, 0.0, marks=pytest.mark.long), (0.06, -0.03)])
 def test_depth_of_water_is_that_of_the_plane(
     river: World, supersample: float, first_row: int, roll_rad: float, pitch_rad: float
 ) -> None:
