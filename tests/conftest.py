@@ -32,6 +32,7 @@ from tests.transcript import Transcript
 ALONE = {"bench", "browser", "deploy", "fault", "firmware", "integration", "link"}  # folders
 RESULTS_ALONE = {
     "bench": "board chain fleet judgement soak",
+    "deploy": "images",
     "browser": """
         camera_labels devices_tab exposed_page fleet_page heading_verdicts health_tab indicator_strip installed
         legibility map_objects map_projection map_tiles mission_cells models_report recording_chip recordings_tab
@@ -44,6 +45,7 @@ RESULTS_ALONE = {
 }  # by folder, the files that wait for results and do not watch the clock
 BESIDE = {f"tests/{folder}/test_{name}.py" for folder, names in RESULTS_ALONE.items() for name in names.split()}
 SOAK = "tests/bench/test_soak.py"  # first, as it sits out its minutes and hardly computes; it yields to nothing
+IMAGES = "tests/deploy/test_images.py"  # next, as what drives in containers waits for them
 STOPS_THE_BOAT = {"fault", "link"}  # folders
 WORKER = "PYTEST_XDIST_WORKER" in os.environ  # other tests run at the same time
 NICENESS = 5  # workers that compute leave more than half of two cores to the one that watches the clock
@@ -77,12 +79,12 @@ def is_whole_run(config: pytest.Config) -> bool:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """In a whole run what watches the clock comes first, and what starts processes gets a second try.
+    """In a whole run what watches the clock or takes longest comes first, and what starts processes gets a second try.
 
     The summary tells of it; what stops the boat gets none. Named tests run in the order in which they are named.
     """
     if is_whole_run(config):
-        items.sort(key=lambda item: (not is_alone(item.nodeid), not item.nodeid.startswith(SOAK)))
+        items.sort(key=lambda item: (not is_alone(item.nodeid), not item.nodeid.startswith((SOAK, IMAGES))))
         for item in items:
             if item.nodeid.split("/")[1] in ALONE - STOPS_THE_BOAT:
                 item.add_marker(pytest.mark.flaky(reruns=1))

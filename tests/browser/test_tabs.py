@@ -62,7 +62,9 @@ async def test_topics_are_searched_chosen_and_frozen(browser: Any, boat: Boat, s
 
         await page.locator("#topics-search").press_sequentially("Advisor/ADV")
         await until(page, f"{SIZE} === 1")
-        assert await page.inner_text("#topics-sum") == f"1 of {all_topics}"
+        found, total = (await page.inner_text("#topics-sum")).split(" of ")
+        assert found == "1"
+        assert int(total) >= all_topics, "as more may have come since"
         await page.click("#topics button")
         await until(page, f"{VALUE}.includes('centre risk 0.80')")
         assert await page.get_attribute("#topics tr", "aria-selected") == "true"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import json
 import os
 import re
@@ -88,10 +89,18 @@ class Engine:
 
 @contextlib.contextmanager
 def running_engine() -> Iterator[Engine]:
-    """Raises NoEngine, with what is missing."""
+    """One user at a time, as two engines would share the kept images. Raises NoEngine, with what is missing."""
     if shutil.which("docker") is None:
         raise NoEngine(f"needs a container engine (Debian: {PACKAGES})")
     KEPT.mkdir(mode=0o700, exist_ok=True)
+    with (KEPT / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        with _running() as engine:
+            yield engine
+
+
+@contextlib.contextmanager
+def _running() -> Iterator[Engine]:
     environment = {**os.environ, "BASE_IMAGE": os.environ.get("BASE_IMAGE", BASE_IMAGE)}
     if not _answers(["docker", "compose", "version"], environment):
         environment["DOCKER_CONFIG"] = str(KEPT)

@@ -1,4 +1,4 @@
-"""Both compose files on a real engine: built, driven, hurt and taken down."""
+"""Both compose files on a real engine: driven, hurt and taken down."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import asyncio
 import os
 import signal
 import subprocess
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -16,7 +15,7 @@ from paani.keys import BUTTON, PORTS, Graph
 from paani.sides import Side, services_on
 from tests.conftest import find_free_port
 from tests.deploy.doors import Doors
-from tests.deploy.engine import Engine, NoEngine, running_engine
+from tests.deploy.engine import Engine
 from tests.deploy.river import afloat, build, driving
 
 pytestmark = [pytest.mark.deploy, pytest.mark.timeout(900)]
@@ -24,28 +23,6 @@ pytestmark = [pytest.mark.deploy, pytest.mark.timeout(900)]
 ZERO_S = 0.5
 BOARD_RSS_MIB = 350.0
 SPEED_MPS = 0.2  # at least, over the whole drive
-
-
-@pytest.fixture(scope="module")
-def engine() -> Iterator[Engine]:
-    try:
-        with running_engine() as found:
-            build(found)
-            yield found
-    except NoEngine as reason:
-        pytest.skip(str(reason))
-
-
-@pytest.mark.parametrize("side", ["board", "host"])
-def test_the_engine_takes_the_file_with_every_profile(engine: Engine, side: str) -> None:
-    engine.compose(side, "--profile", "*", "config", "-q")
-
-
-@pytest.mark.parametrize("side", ["board", "host"])
-def test_an_image_holds_no_secret_and_nothing_of_the_build(engine: Engine, side: str) -> None:
-    run = ("run", "--rm", "--network", "none", "--entrypoint")
-    assert engine.docker(*run, "find", f"paani-{side}", "/var/lib/paani", "-type", "f") == ""
-    assert not {"source", "build", "wheel"} & set(engine.docker(*run, "ls", f"paani-{side}", "/").split())
 
 
 @pytest.mark.parametrize("driven_s", [8.0, pytest.param(60.0, marks=pytest.mark.long)])

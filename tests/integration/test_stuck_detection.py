@@ -13,7 +13,7 @@ from paani import messages as m
 from paani.config import load_config
 from paani.geometry import wrap_rad
 from paani_services.advisor.advise import AdvisorState, advise
-from tests.scenario.test_closed_loop_guidance import Lockstep, open_water
+from tests.guidance_loop import Lockstep, open_water
 from tests.unit.paani_services.advisor.advisor_evidence import box, seeing
 
 pytestmark = [pytest.mark.integration, pytest.mark.timeout(300)]

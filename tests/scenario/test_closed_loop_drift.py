@@ -9,12 +9,12 @@ from collections.abc import Callable, Iterator
 import msgspec
 import pytest
 
-from paani.config import load_config
 from paani.fence_geometry import distance_to_edge_m, is_allowed
 from paani.messages import Advisory, Direction, FenceArea, Inhibit, Keep, Reason, Waypoint
 from paani.motion_planning import HeadingSpeed, PlanningInputs
 from paani_sim.worlds import Current, Wind, World
-from tests.scenario.test_closed_loop_guidance import Lockstep, off_route_m, open_water
+from tests.guidance_loop import Lockstep, off_route_m, open_water
+from tests.scenario.conftest import Launch
 from tests.synthetic_water import AT_REST, CAMERA, evidence, water_edge_of
 
 PERFECT = ("plant.sensors.gps_bias_std_m=0.0", "plant.sensors.compass_bias_std_rad=0.0", "plant.vessel=otter")
@@ -34,9 +34,9 @@ def cross_track_m(boat: Lockstep) -> Iterator[float]:
         yield off_route_m(boat.world, boat.plant.position_m)
 
 
-def test_the_true_boat_comes_to_rest_inside_the_fence(windy_lake: World) -> None:
+def test_the_true_boat_comes_to_rest_inside_the_fence(launch: Launch, windy_lake: World) -> None:
     """The fence cuts the route: while the boat brakes, its true position stays inside in spite of wind and current."""
-    boat = Lockstep(windy_lake, load_config(sets=PERFECT))
+    boat = launch(windy_lake, "paani", *PERFECT)
     start = boat.plant.position_m
     corners = [(start[0] + x, start[1] + y) for x, y in ((-18.0, -60.0), (40.0, -60.0), (40.0, 60.0), (-18.0, 60.0))]
     area = FenceArea(keep=Keep.IN, corners=tuple(Waypoint(x_m=x, y_m=y) for x, y in corners))
@@ -50,17 +50,14 @@ def test_the_true_boat_comes_to_rest_inside_the_fence(windy_lake: World) -> None
     assert fastest_mps > 0.5
     assert is_allowed(boat.mission.fence, boat.plant.position_m)
     assert distance_to_edge_m(boat.mission.fence, boat.plant.position_m) < 6.0
-    boat.plant.close()
 
 
-def test_the_integral_holds_the_line_against_wind_and_current(windy_lake: World) -> None:
+def test_the_integral_holds_the_line_against_wind_and_current(launch: Launch, windy_lake: World) -> None:
     """A minute after the start the boat is on its line; without the integral it is more than a metre off."""
     worst_m = {}
     for gain_mps in (0.0, 0.25):
-        config = load_config(sets=(*PERFECT, f"navigator.crab_gain_mps={gain_mps}"))
-        boat = Lockstep(windy_lake, config)
+        boat = launch(windy_lake, "paani", *PERFECT, f"navigator.crab_gain_mps={gain_mps}")
         worst_m[gain_mps] = max(cross_track_m(boat))
-        boat.plant.close()
     assert worst_m[0.25] < 0.25
     assert worst_m[0.0] > 1.0
 
@@ -82,9 +79,8 @@ def stop_by_the_planner(boat: Lockstep) -> Inhibit:
     return Inhibit.NO_FREE_PATH
 
 
-def farthest_while_stopped_m(world: World, stop: Callable[[Lockstep], Inhibit], *sets: str) -> float:
+def farthest_while_stopped_m(boat: Lockstep, stop: Callable[[Lockstep], Inhibit]) -> float:
     """How far the boat ever is from where it was [m] in 90 s of a STOP for what lies on the water, or of no path."""
-    boat = Lockstep(world, load_config(sets=(*PERFECT, *sets)))
     boat.camera = CAMERA
     from_m, farthest_m, reason = boat.plant.position_m, 0.0, stop(boat)
     for _ in boat.run(90.0):
@@ -92,7 +88,6 @@ def farthest_while_stopped_m(world: World, stop: Callable[[Lockstep], Inhibit], 
         farthest_m = max(farthest_m, math.dist(from_m, boat.plant.position_m))
     assert boat.command is not None
     assert boat.command.halt_reasons == (reason,)
-    boat.plant.close()
     return farthest_m
 
 
@@ -108,25 +103,26 @@ def farthest_while_stopped_m(world: World, stop: Callable[[Lockstep], Inhibit], 
     ],
 )
 def test_a_stopped_boat_does_not_drift_on_to_what_it_stopped_for(
-    stop: Callable[[Lockstep], Inhibit], to_the_bow_rad: float
+    launch: Launch, stop: Callable[[Lockstep], Inhibit], to_the_bow_rad: float
 ) -> None:
     """0.2 m/s of current from any side: in 90 s it is never as far away as one that drifts is in 10 s."""
     lake = open_water("lake")
     current = Current(speed_mps=0.2, toward_rad=lake.start.yaw_rad + to_the_bow_rad)
     streaming = dataclasses.replace(lake, current=current)
     adrift_m, kept_m = (
-        farthest_while_stopped_m(streaming, stop, f"navigator.keep_station={keeps}") for keeps in ("false", "true")
+        farthest_while_stopped_m(launch(streaming, "paani", *PERFECT, f"navigator.keep_station={keeps}"), stop)
+        for keeps in ("false", "true")
     )
     assert adrift_m > 10.0
     assert kept_m < 10.0 / 90.0 * adrift_m
 
 
 @pytest.mark.parametrize("to_the_bow_rad", [0.0, math.pi, 0.5 * math.pi], ids=["bow first", "stern first", "abeam"])
-def test_a_boat_that_stopped_under_way_notices_that_it_is_carried_slowly(to_the_bow_rad: float) -> None:
+def test_a_boat_that_stopped_under_way_notices_that_it_is_carried_slowly(launch: Launch, to_the_bow_rad: float) -> None:
     """0.04 m/s of current, with the simulator's receiver and IMU: it is kept within a metre for 90 s."""
     lake = open_water("lake")
     current = Current(speed_mps=0.04, toward_rad=lake.start.yaw_rad + to_the_bow_rad)
-    boat = Lockstep(dataclasses.replace(lake, current=current), load_config())
+    boat = launch(dataclasses.replace(lake, current=current))
     boat.settle(15.0)
     assert boat.plant.velocity[0] > 0.3
     boat.camera = CAMERA
@@ -136,4 +132,3 @@ def test_a_boat_that_stopped_under_way_notices_that_it_is_carried_slowly(to_the_
     for _ in boat.run(90.0):
         stop_by_the_advice(boat)
     assert math.dist(from_m, boat.plant.position_m) < 1.0
-    boat.plant.close()
