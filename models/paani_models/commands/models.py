@@ -149,7 +149,7 @@ def _parser() -> argparse.ArgumentParser:
         "--looks-at", metavar="HEIGHTxWIDTH", help="segmenters: the picture inside, of a training that ended smaller"
     )
     export.add_argument(
-        "--mean-with", type=Path, metavar="FILE", help="detector: the mean of the checkpoint's weights and these"
+        "--mean-with", type=Path, metavar="FILE", help="detector, gate: the mean of the checkpoint's weights and these"
     )
     export.add_argument("--share", type=float, help="of --mean-with's weights in it; 0.5 if not given")
     evaluate = commands.add_parser("evaluate", help="figures of the exported nets on held-out sequences")

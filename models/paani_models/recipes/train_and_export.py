@@ -24,6 +24,7 @@ from paani_models.detector.paper_network import Yolo11n
 from paani_models.detector.shipped_network import FIRST_STAGES, Detector, load_yolox_weights
 from paani_models.detector.train import DetectorRecipe, DetectorTraining
 from paani_models.detector.train_paper_network import Yolo11nRecipe, Yolo11nTraining
+from paani_models.image_quality.network import ImageQualityNetwork, start_from_export
 from paani_models.image_quality.train import ImageQualityRecipe, ImageQualityTraining
 from paani_models.network_input import (
     DETECTOR_SIZE_WH,
@@ -213,9 +214,15 @@ def start_detector(data: Path, options: TrainingOptions) -> Detector:
 
 
 def take_share(model: nn.Module, path: Path, share: float) -> None:
-    """Give a detector's weights that share of those of a checkpoint or an exported file. Raises UserError."""
-    other = Detector()
-    _load_detector(other, path)
+    """Give the weights of a detector, or of an image-quality network, that share of those of an exported file.
+
+    Of a detector a checkpoint will do as well. Raises UserError.
+    """
+    other = ImageQualityNetwork() if isinstance(model, ImageQualityNetwork) else Detector()
+    if isinstance(other, ImageQualityNetwork):
+        start_from_export(other, path)
+    else:
+        _load_detector(other, path)
     blend_weights(model, other, share, "--share")
 
 
@@ -273,9 +280,10 @@ def export_checkpoint(
 ) -> None:
     """Write the ONNX file and its manifest entry, with the provenance of the chosen sources.
 
-    looks_at: `HEIGHTxWIDTH` of the picture inside a segmenter. mean_with, share: a detector's earlier weights, and how
-    much of them the mean with the checkpoint's takes (None: half). Raises UserError where one is malformed, not for the
-    network or without the other, and rather than put one of the paper's networks in the place of ours.
+    looks_at: `HEIGHTxWIDTH` of the picture inside a segmenter. mean_with, share: a detector's or a gate's earlier
+    weights, and how much of them the mean with the checkpoint's takes (None: half). Raises UserError where one is
+    malformed, not for the network or without the other, and rather than put one of the paper's networks in the place
+    of ours.
     """
     if net in PAPER_NETWORKS and weights.resolve() == WEIGHTS.resolve():
         raise UserError(f"--weights: {net} is not what ships there; the set `paper` lies in {PAPER_WEIGHTS}")
@@ -284,8 +292,8 @@ def export_checkpoint(
         if "segmenter" not in net:
             raise UserError(f"--looks-at: {net} is no segmenter")
         inside = parse_size(looks_at)
-    if mean_with is not None and net != "detector":
-        raise UserError(f"--mean-with: {net} is no detector of ours")
+    if mean_with is not None and net not in ("detector", "gate"):
+        raise UserError(f"--mean-with: {net} is neither our detector nor our gate")
     if share is not None and mean_with is None:
         raise UserError(f"--share {share:g}: of what? --mean-with says whose weights")
     chosen = (

@@ -1,7 +1,6 @@
 """Training machinery: schedule, order, averages, checkpoints, and a resumed run that equals an unbroken one."""
 
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import cv2
@@ -34,8 +33,6 @@ from paani_models.recipes.train_and_export import (  # noqa: E402
     parse_size,
     parse_stages,
     segmenter_recipe,
-    start_detector,
-    take_share,
 )
 from paani_models.recipes.warm_start import load_exported  # noqa: E402
 from paani_models.segmenter import train as segmenter_train  # noqa: E402
@@ -49,7 +46,6 @@ from paani_models.training.training_state import (  # noqa: E402
     TrainingState,
     learning_rate,
     load_checkpoint,
-    save_checkpoint,
     stage_at_epoch,
 )
 from tests import pictures  # noqa: E402
@@ -186,40 +182,11 @@ def test_a_detector_is_exported_for_the_size_that_it_was_trained_with(
     assert (model.input.shape, model.output.shape) == ((1, 3, 64, 96), (1, 8, 8 * 12 + 4 * 6 + 2 * 3))
 
 
-@pytest.mark.train
-def test_a_detector_is_exported_with_a_share_of_earlier_weights(tmp_path: Path) -> None:
-    earlier, later, loaded = Detector(), Detector(), Detector()
-    recipe = {"seed": 1, "height_px": 64, "width_px": 96}
-    save_checkpoint(tmp_path / "earlier.pt", {"average": earlier.state_dict()})
-    save_checkpoint(tmp_path / "later.pt", {"average": later.state_dict(), "recipe": recipe})
-    inputs = [np.random.default_rng(0).random((1, 3, 64, 96), dtype=np.float32)]
-    change = partial(take_share, path=tmp_path / "earlier.pt", share=0.25)
-    export_network("detector", tmp_path / "later.pt", tmp_path, inputs, (), change=change)
-    load_exported(loaded, tmp_path / "detector.onnx", torch.zeros(1, 3, 64, 96))
-    wanted = 0.25 * earlier.stem.conv.weight + 0.75 * later.stem.conv.weight
-    torch.testing.assert_close(loaded.stem.conv.weight, wanted)
-
-
 def test_a_size_is_height_times_width_in_whole_cells() -> None:
     assert parse_size("320x416") == (320, 416)
     for wrong in ("320", "320x416x3", "300x400"):
         with pytest.raises(UserError, match="stage"):
             parse_size(wrong)
-
-
-@pytest.mark.train
-def test_a_detector_may_start_from_the_mean_of_two(tmp_path: Path) -> None:
-    """A checkpoint and an exported file."""
-    stored = Detector()
-    save_checkpoint(tmp_path / "a.pt", {"average": stored.state_dict()})
-    options = TrainingOptions(tmp_path, start=tmp_path / "a.pt", mean_with=verified_path("detector"))
-    mean = start_detector(tmp_path, options).dark4[0][0].conv.weight
-    alone = [
-        start_detector(tmp_path, TrainingOptions(tmp_path, start=path)).dark4[0][0].conv.weight
-        for path in (options.start, options.mean_with)
-    ]
-    assert not torch.equal(*alone)
-    torch.testing.assert_close(mean, (alone[0] + alone[1]) / 2)
 
 
 def test_epoch_order_depends_on_seed_and_epoch_only_and_holds_the_nulls(
@@ -336,7 +303,7 @@ def test_a_picture_inside_is_of_a_segmenter_and_of_whole_cells(
     assert main(["export", *words, *where]) == 2
     assert "--looks-at: detector" in (message := capsys.readouterr().err) or "multiples of 32" in message
     assert main(["export", "segmenter", "--mean-with", "earlier.onnx", *where]) == 2
-    assert capsys.readouterr().err == "paani models: --mean-with: segmenter is no detector of ours\n"
+    assert capsys.readouterr().err == "paani models: --mean-with: segmenter is neither our detector nor our gate\n"
     assert main(["export", "detector", "--share", "0.25", *where]) == 2
     assert capsys.readouterr().err == "paani models: --share 0.25: of what? --mean-with says whose weights\n"
 
