@@ -77,4 +77,6 @@ async def test_topics_are_searched_chosen_and_frozen(browser: Any, boat: Boat, s
         assert not await is_changing(page, VALUE)
         await page.click("#topics-freeze")
         assert await is_changing(page, VALUE)
+        await page.fill("#topics-search", "")
+        await until(page, f"{SIZE} >= {total}")
         assert watched.errors == []
