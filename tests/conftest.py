@@ -40,7 +40,7 @@ RESULTS_ALONE = {
     """,
     "integration": """
         certificates claims_check cluster docs doctor examples fleet graphs inspect mavlink package
-        replay stuck_detection trials up up_offline up_record
+        replay trials up up_offline up_record
     """,
 }  # by folder, the files that wait for results and do not watch the clock
 BESIDE = {f"tests/{folder}/test_{name}.py" for folder, names in RESULTS_ALONE.items() for name in names.split()}

@@ -7,11 +7,7 @@ import numpy as np
 import pytest
 
 from paani.geometry import wrap_rad
-from paani.messages import (
-    Direction,
-    Inhibit,
-    ZeroCause,
-)
+from paani.messages import Direction, Inhibit, ZeroCause
 from paani_sim.worlds import load_world
 from tests.guidance_loop import Lockstep, off_route_m, open_water
 from tests.scenario.conftest import Launch

@@ -218,10 +218,12 @@ def take_share(model: nn.Module, path: Path, share: float) -> None:
 
     Of a detector a checkpoint will do as well. Raises UserError.
     """
-    other = ImageQualityNetwork() if isinstance(model, ImageQualityNetwork) else Detector()
-    if isinstance(other, ImageQualityNetwork):
+    other: Detector | ImageQualityNetwork
+    if isinstance(model, ImageQualityNetwork):
+        other = ImageQualityNetwork()
         start_from_export(other, path)
     else:
+        other = Detector()
         _load_detector(other, path)
     blend_weights(model, other, share, "--share")
 
