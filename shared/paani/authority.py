@@ -25,6 +25,7 @@ from paani.sides import ROUTER, Side, pictures_sent, writers_on
 OBSERVER = "observer"
 TRUTH_READERS = ("eye", "dashboard", "recorder", OBSERVER)
 USERS_FILE = ".users"
+EVERYBODY = frozenset({*keys.SERVICES, *keys.COMMAND_LINE_CLIENTS, OBSERVER, LINK, USERS_FILE})  # whatever the graph
 
 
 def users_in(graph: keys.Graph) -> tuple[str, ...]:
@@ -50,7 +51,7 @@ def credentials_folder(config: BusConfig) -> Path:
 
 
 def ensure_credentials(config: BusConfig) -> Path:
-    """One random password file per user (0600), made at the first start. Returns the folder.
+    """One random password file per user (0600), made at the first start, and for other users. Returns the folder.
 
     Board and host have the same: the board makes it. Raises UserError on a host that has not got it. With certificates
     (`bus.certificates`) nothing is made; raises UserError unless all that this side needs are there and in force.
@@ -61,19 +62,34 @@ def ensure_credentials(config: BusConfig) -> Path:
         require_certificates(config, (*own, listener_of(config)))
         return Path(config.certificates)
     folder, users = credentials_folder(config), users_in(config.graph)
-    if not folder.is_dir() or {path.name for path in folder.iterdir()} != {*users, USERS_FILE}:
-        if config.side is Side.HOST:
-            raise UserError(f"{folder}: not the board's credentials; copy there the folder that the board has made")
-        beside = folder.with_name(f".{folder.name}.{os.getpid()}")
-        shutil.rmtree(beside, ignore_errors=True)
+    try:
+        if not folder.exists() or EVERYBODY.intersection(path.name for path in folder.iterdir()) != {
+            *users,
+            USERS_FILE,
+        }:
+            if config.side is Side.HOST:
+                raise UserError(f"{folder}: not the board's credentials; copy there the folder that the board has made")
+            _make_credentials(folder, users)
+    except OSError as error:
+        raise UserError(f"{folder}: {error.strerror}") from error
+    return folder
+
+
+def _make_credentials(folder: Path, users: tuple[str, ...]) -> None:
+    """New passwords for everybody, in place of what is there. Raises OSError, and leaves nothing half made."""
+    beside = folder.with_name(f".{folder.name}.{os.getpid()}")
+    shutil.rmtree(beside, ignore_errors=True)
+    try:
         beside.mkdir(mode=0o700)
         passwords = {user: secrets.token_urlsafe(24) for user in users}
         for user, password in passwords.items():
             write_private(beside / user, password)
         write_private(beside / USERS_FILE, "".join(f"{user}:{word}\n" for user, word in passwords.items()))
-        shutil.rmtree(folder, ignore_errors=True)
+        if folder.exists():
+            shutil.rmtree(folder)
         beside.rename(folder)
-    return folder
+    finally:
+        shutil.rmtree(beside, ignore_errors=True)
 
 
 def require_place(config: BusConfig, user: str) -> None:
@@ -91,6 +107,8 @@ def password_of(config: BusConfig, user: str) -> str:
         return path.read_text(encoding="utf-8")
     except OSError as error:
         raise UserError(f"{path}: {error.strerror} (credentials are made when the router first starts)") from error
+    except UnicodeDecodeError as error:
+        raise UserError(f"{path}: no password ({error.reason})") from error
 
 
 def has_password(config: BusConfig, user: str) -> bool:

@@ -99,5 +99,5 @@ def _service_config(name: str, rest: list[str]) -> Config:
     options = parser.parse_args(rest)
     handed = os.environ.get("PAANI_CONFIG_JSON")
     if handed and not (options.profile or options.config or options.sets):
-        return decode_config(handed.encode())
+        return decode_config(os.fsencode(handed))
     return config_from(options)

@@ -29,6 +29,11 @@ class MonotonicClock:
         return time.monotonic_ns() // 1000
 
 
+def steady_beside(clock: Clock) -> Clock:
+    """What tells ages beside this clock: itself, or where it is one that may be set, one that never is."""
+    return MonotonicClock() if isinstance(clock, WallClock) else clock
+
+
 def _boot_origin_us() -> int:
     """Drawn by the kernel at each start of the machine; of no more digits than a time of this century."""
     try:

@@ -1,7 +1,7 @@
 """Where a boat may be: plane geometry of a fence in the map frame. Pure.
 
 A point is allowed if it lies inside at least one area that keeps in, where there are any, and inside none that keeps
-out. The edge itself is not allowed.
+out, whose edge is not allowed either.
 """
 
 from __future__ import annotations

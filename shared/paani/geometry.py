@@ -10,7 +10,7 @@ ECCENTRICITY2 = 6.694379990141317e-3
 
 
 def wrap_rad(angle: float) -> float:
-    """The same angle in [-pi, pi)."""
+    """The same angle in [-pi, pi]; pi only where rounding makes it."""
     return (angle + math.pi) % (2.0 * math.pi) - math.pi
 
 
@@ -21,7 +21,7 @@ def clip(value: float, low: float, high: float) -> float:
 
 def heading_true_deg(yaw_rad: float) -> float:
     """Compass heading, clockwise from true north, in [0, 360), of an ENU yaw."""
-    return (90.0 - math.degrees(yaw_rad)) % 360.0
+    return (90.0 - math.degrees(yaw_rad)) % 360.0 % 360.0  # the first of a tiny negative angle rounds to 360
 
 
 def enu_from_geodetic(

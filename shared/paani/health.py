@@ -14,7 +14,6 @@ from paani import messages as m
 from paani.bus.inbox import Inbox
 from paani.clock import process_cpu_s
 
-PAGE_KIB = 4
 RATE_TOLERANCE = 0.5  # an input is at rate while at least this share of its nominal rate arrives
 
 
@@ -76,7 +75,7 @@ class HealthReporter:
 
 def rss_mib() -> float:
     """Resident memory of this process [MiB]."""
-    return int(_read("/proc/self/statm").split()[1]) * PAGE_KIB / 1024
+    return int(_read("/proc/self/statm").split()[1]) * resource.getpagesize() / 2**20
 
 
 def count_open_files() -> int:

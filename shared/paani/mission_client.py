@@ -11,7 +11,7 @@ from msgspec.structs import replace
 from paani import keys
 from paani import messages as m
 from paani.bus import Bus
-from paani.clock import Clock
+from paani.clock import Clock, has_passed
 from paani.missions import find_mission_fault, find_rally_fault
 
 REPEAT_S = 2.0  # a mission of 10,000 waypoints is half a megabyte, and takes seconds to check
@@ -70,13 +70,14 @@ class MissionClient:
         if fault:
             return MissionAnswer(m.MissionRefusal.INVALID, fault)
         press = secrets.randbits(32) + 1
-        due_us = 0
+        asked_us = 0
         try:
             async with asyncio.timeout(timeout_s):
                 while (answer := self._answer_to(press)) is None:
-                    if (now_us := self._clock.now_us()) >= due_us:
+                    now_us = self._clock.now_us()
+                    if has_passed(asked_us, REPEAT_S * 1e6, now_us):
                         self._requests.put(replace(request, source_us=now_us, press=press, hand=hand))
-                        due_us = now_us + round(REPEAT_S * 1e6)
+                        asked_us = now_us
                     await asyncio.sleep(POLL_S)
         except TimeoutError:
             return None

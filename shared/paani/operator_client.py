@@ -9,7 +9,7 @@ from collections.abc import Callable
 from paani import keys
 from paani import messages as m
 from paani.bus import Bus
-from paani.clock import Clock
+from paani.clock import Clock, has_passed
 
 REPEAT_S = 0.1
 POLL_S = 0.02
@@ -37,10 +37,10 @@ class OperatorClient:
 
     async def stop(self, timeout_s: float) -> m.OperatorState | None:
         """Ask for STOP; the state in which it is latched, or None where nobody has answered in time."""
-        begun_us = self._clock.now_us()
+        heard_before = self.states.received
 
         def is_latched(state: m.OperatorState) -> bool:
-            return state.stopped and self.states.received_us >= begun_us
+            return state.stopped and self.states.received > heard_before
 
         return await self._ask(m.RequestAct.STOP, 0, is_latched, timeout_s)
 
@@ -117,13 +117,14 @@ class OperatorClient:
         hand: int = 0,
         mode: m.DriveMode = m.DriveMode.IDLE,
     ) -> m.OperatorState | None:
-        due_us = 0
+        asked_us = 0
         try:
             async with asyncio.timeout(timeout_s):
                 while (state := self.state) is None or not is_answer(state):
-                    if (now_us := self._clock.now_us()) >= due_us:
+                    now_us = self._clock.now_us()
+                    if has_passed(asked_us, REPEAT_S * 1e6, now_us):
                         self._put(act, press, hand, mode=mode)
-                        due_us = now_us + round(REPEAT_S * 1e6)
+                        asked_us = now_us
                     await asyncio.sleep(POLL_S)
         except TimeoutError:
             return None

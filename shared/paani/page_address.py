@@ -2,20 +2,11 @@
 
 from __future__ import annotations
 
-import ipaddress
-
 from paani.config import Config
+from paani.port_address import is_loopback
 
 LOGIN_PATH = "/login"
 ANYWHERE = {"0.0.0.0": "127.0.0.1", "::": "::1"}  # what listens everywhere is asked at home
-
-
-def is_loopback(host: str) -> bool:
-    """Whether only this machine reaches a server at this host. A name other than localhost may be anybody's."""
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host.lower() == "localhost"
 
 
 def is_page_exposed(config: Config) -> bool:

@@ -57,8 +57,17 @@ def tcp_address(address: str) -> tuple[str, int]:
     raise ValueError(f"'{address}' is no HOST:PORT")
 
 
+def parse_endpoint(address: str) -> tuple[str, str, int]:
+    """Scheme, host without brackets, and port of `tcp/HOST:PORT` or `tls/HOST:PORT`. Raises ValueError, in one line."""
+    scheme, _, place = address.partition("/")
+    if scheme in {"tcp", "tls"}:
+        with contextlib.suppress(ValueError):
+            return scheme, *tcp_address(place)
+    raise ValueError(f"{address}: expected tcp/HOST:PORT")
+
+
 def is_loopback(host: str | None) -> bool:
     """Whether only programs of this machine reach a host: `localhost`, or an address of the loopback interface."""
     with contextlib.suppress(ValueError):
         return ipaddress.ip_address(host or "").is_loopback
-    return host == "localhost"
+    return (host or "").lower() == "localhost"

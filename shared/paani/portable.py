@@ -45,17 +45,17 @@ def log(x: float) -> float:
 
 def sin(rad: float) -> float:
     """Sine of an angle [rad]."""
-    return _direction(rad)[1]
+    return _direction(rad + 0.0)[1]
 
 
 def cos(rad: float) -> float:
     """Cosine of an angle [rad]."""
-    return _direction(rad)[0]
+    return _direction(rad + 0.0)[0]
 
 
 def tan(rad: float) -> float:
     """Tangent of an angle [rad] that is not a quarter turn."""
-    cosine, sine = _direction(rad)
+    cosine, sine = _direction(rad + 0.0)
     return sine / cosine
 
 
@@ -70,7 +70,7 @@ def atan2(y: float, x: float) -> float:
 
 @functools.lru_cache(maxsize=512)  # one attitude turns every corner of every box
 def _direction(rad: float) -> tuple[float, float]:
-    """Cosine and sine."""
+    """Cosine and sine. Never asked for -0.0, which what is kept could not tell from 0.0."""
     rad = math.remainder(rad, math.tau)
     quarter = round(rad / HALF_PI)
     rest = (rad - quarter * HALF_PI_HIGH) - quarter * HALF_PI_LOW

@@ -19,8 +19,6 @@ import serial
 
 from paani.port_address import parse_address
 
-__all__ = ["Port", "PortError", "SerialPort", "StreamPort", "describe", "open_port", "parse_address"]
-
 MAX_WAITING_BYTES = 65_536  # over five seconds at 115200 baud: older bytes are of no use to anybody
 READ_BYTES = 4096  # the kernel's buffer of a serial device
 __all__ = [
@@ -233,7 +231,7 @@ async def open_port(address: str) -> Port:
             _, stream = await loop.create_connection(lambda: StreamPort(address), host, int(port))
     except TimeoutError as error:
         raise PortError(f"{address}: no answer") from error
-    except OSError as error:
+    except (OSError, UnicodeError) as error:
         raise PortError(f"{address}: {describe(error)}") from error
     return stream
 
@@ -257,6 +255,8 @@ def _close_unused(opening: asyncio.Future[serial.Serial]) -> None:
 
 def describe(error: Exception) -> str:
     """The cause of a failure in words; pyserial's texts repeat the path and Python's notation of the error."""
+    if isinstance(error, socket.gaierror | UnicodeError):
+        return "no such host"
     match getattr(error, "errno", None):
         case None:
             return "is no serial device" if isinstance(error, serial.SerialException) else str(error)

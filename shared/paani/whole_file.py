@@ -32,12 +32,20 @@ def indented_json(value: object) -> bytes:
 def replacement_file(path: Path, option: str = "") -> Iterator[Path]:
     """A path to write to, which takes the place of `path` at the end and is removed where anything goes wrong.
 
-    Raises UserError naming the file, and the option that asked for it.
+    A link stays one, its target is replaced; a pipe or a device is written to as it is. Raises UserError naming the
+    file, and the option that asked for it.
     """
-    beside = path.with_name(f".{path.name}.partial")
+    try:
+        if path.exists() and not path.is_file() and not path.is_dir():
+            yield path
+            return
+        target = path.resolve() if path.is_symlink() else path
+    except (OSError, RuntimeError) as error:
+        raise UserError(f"{option} {path}: {getattr(error, 'strerror', None) or error}".strip()) from error
+    beside = target.with_name(f".{target.name}.partial")
     try:
         yield beside
-        beside.replace(path)
+        beside.replace(target)
     except OSError as error:
         raise UserError(f"{option} {path}: {error.strerror or error}".strip()) from error
     finally:

@@ -135,6 +135,11 @@ def test_a_graph_has_credentials_of_its_own(tmp_path: Any) -> None:
         users = {path.name for path in folders[graph].iterdir()} - {authority.USERS_FILE}
         assert users == set(authority.users_in(graph))
         assert authority.ensure_credentials(bus) == folders[graph]
+        (folders[graph] / ".nfs0001").touch()
+        word = (folders[graph] / "controller").read_text()
+        assert (authority.ensure_credentials(bus) / "controller").read_text() == word, (
+            "a stranger's file changes nothing"
+        )
     words = {graph: (folder / "controller").read_text() for graph, folder in folders.items()}
     assert len(set(words.values())) == len(GRAPHS)
     (folders[Graph.HULL] / "plant").write_text("of another day")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import gc
 from collections.abc import Callable
+from pathlib import Path
 
 import msgspec
 import pytest
@@ -18,6 +19,7 @@ from paani.bus.routing import open_router
 from paani.bus.session import MAX_BYTES
 from paani.clock import ManualClock, WallClock
 from paani.config import Config, load_config
+from paani.errors import UserError
 from tests.at_work import at_work
 from tests.conftest import OpenAs, Spawn, put_raw
 
@@ -184,6 +186,15 @@ async def test_alive_means_ready(open_as: OpenAs, spawn: Spawn) -> None:
         assert report.ready
         assert {entry.topic for entry in report.inputs} >= {keys.EVIDENCE.name}
         assert report.rss_mib > 10
+
+
+async def test_a_report_that_fails_ends_the_service(open_as: OpenAs, config: Config) -> None:
+    bus, folder = await open_as("controller"), Path(config.bus.runtime_dir)
+    beside = folder.with_name("elsewhere")
+    folder.rename(beside)
+    folder.symlink_to(beside)
+    with pytest.raises(UserError, match=r"bus\.runtime_dir .*: is a link"), bus.alive():
+        await asyncio.Event().wait()
 
 
 async def test_a_process_gives_back_what_it_has_freed(open_as: OpenAs, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -66,6 +66,19 @@ def test_every_file_that_a_page_names_exists() -> None:
                 assert name in modules, f"{page.name}: {name}"
 
 
+def test_every_file_that_a_package_says_it_has_is_there_and_its_links_lead_somewhere() -> None:
+    pages = [page for folder in FOLDERS for page in (ROOT / folder).rglob("README.md")]
+    assert len(pages) >= 20
+    for page in pages:
+        text = page.read_text(encoding="utf-8")
+        for link in re.findall(r"\]\(([^)#\s]+)", text):
+            assert "://" in link or (page.parent / link).exists(), f"{page.relative_to(ROOT)}: {link}"
+        for table in re.findall(r"^\| (?:file|module) \|.*\n((?:\|.*\n)+)", text, flags=re.MULTILINE):
+            for name in re.findall(r"`([\w./-]+)`", "".join(row.split("|")[1] for row in table.splitlines())):
+                is_there = any(page.parent.rglob(name)) or any((ROOT / folder / name).exists() for folder in ("", *FOLDERS))
+                assert is_there, f"{page.relative_to(ROOT)}: {name}"
+
+
 def test_links_are_followed_by_file_and_anchor(tmp_path: Path) -> None:
     (tmp_path / "a.html").write_text(
         '<h1 id="top"></h1><a href="b.html#here"></a><a href="#top"></a><a href="b.html"></a>'

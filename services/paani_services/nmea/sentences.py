@@ -29,12 +29,12 @@ def position_sentences(odometry: m.Odometry | None) -> list[str]:
     place = [*degrees_text(odometry.latitude_deg, "NS", 2), *degrees_text(odometry.longitude_deg, "EW", 3)]
     speed_mps = math.hypot(odometry.surge_mps, odometry.sway_mps)
     course_rad = odometry.yaw_rad + math.atan2(odometry.sway_mps, odometry.surge_mps)
-    course = "" if odometry.stopped else f"{heading_true_deg(course_rad):.1f}"
+    course = "" if odometry.stopped else _bearing_text(course_rad)
     moving = [f"{speed_mps * KNOTS_PER_MPS:.2f}", course, f"{utc:%d%m%y}", "", "", "E"]
     return [
         sentence("RMC", time, "A", *place, *moving),
         sentence("GGA", time, *place, str(ESTIMATED_FIX), *[""] * 8),
-        sentence("HDT", f"{heading_true_deg(odometry.yaw_rad):.1f}", "T"),
+        sentence("HDT", _bearing_text(odometry.yaw_rad), "T"),
     ]
 
 
@@ -46,9 +46,9 @@ def target_sentences(odometry: m.Odometry | None, prediction: m.Prediction | Non
     for obstacle in prediction.obstacles[:MAX_TARGETS]:
         east_m, north_m = obstacle.x_m - odometry.x_m, obstacle.y_m - odometry.y_m
         distance = f"{math.hypot(east_m, north_m) / METRES_PER_NAUTICAL_MILE:.4f}"
-        bearing = f"{heading_true_deg(math.atan2(north_m, east_m)):.1f}"
+        bearing = _bearing_text(math.atan2(north_m, east_m))
         speed = f"{math.hypot(obstacle.east_mps, obstacle.north_mps) * KNOTS_PER_MPS:.2f}"
-        course = f"{heading_true_deg(math.atan2(obstacle.north_mps, obstacle.east_mps)):.1f}"
+        course = _bearing_text(math.atan2(obstacle.north_mps, obstacle.east_mps))
         number, status = f"{obstacle.track_id % 100:02d}", "T" if obstacle.age_s < 1.0 else "Q"  # tracked, or doubtful
         lines.append(
             sentence("TTM", number, distance, bearing, "T", speed, course, "T", "", "", "N", "", status, "", "", "A")
@@ -60,6 +60,11 @@ def sentence(kind: str, *fields: str) -> str:
     """A sentence with its checksum and line end."""
     body = ",".join((f"{TALKER}{kind}", *fields))
     return f"${body}*{functools.reduce(operator.xor, body.encode('ascii')):02X}\r\n"
+
+
+def _bearing_text(yaw_rad: float) -> str:
+    """Degrees true of an ENU yaw, with one decimal: what rounds to 360.0 is 0.0."""
+    return f"{round(heading_true_deg(yaw_rad), 1) % 360.0:.1f}"
 
 
 def degrees_text(angle_deg: float, sides: str, digits: int) -> tuple[str, str]:

@@ -8,11 +8,12 @@ import socket
 from collections.abc import Iterator
 from http.client import HTTPException
 
-from paani.bus.routing import parse_endpoint, require_addresses
+from paani.bus.routing import require_addresses
 from paani.config import BusConfig, Config
 from paani.errors import UserError
 from paani.page_address import LOGIN_PATH, is_page_exposed
 from paani.page_connection import connect_to_page
+from paani.port_address import parse_endpoint
 from paani.sides import Side
 from paani_tools.doctor.finding import Verdict, failed, passed, warned
 from paani_tools.inspect.listen import observer
@@ -35,7 +36,7 @@ def check_router(config: Config) -> Iterator[Verdict]:
     else:
         yield passed(f"{bus.router}: free")
     if bus.side is Side.HOST and bus.link:
-        if _is_connected("bus.link", bus.link):
+        if _is_connected(bus.link):
             yield passed(f"bus.link {bus.link}: the board answers")
         else:
             yield warned(f"bus.link {bus.link}: the board does not answer", "start the board; the host waits for it")
@@ -50,8 +51,8 @@ async def _lets_us_in(bus: BusConfig) -> bool:
         return False
 
 
-def _is_connected(name: str, endpoint: str) -> bool:
-    _, host, port = parse_endpoint(name, endpoint)
+def _is_connected(endpoint: str) -> bool:
+    _, host, port = parse_endpoint(endpoint)
     with contextlib.suppress(OSError), socket.create_connection((host, port), REACH_S):
         return True
     return False

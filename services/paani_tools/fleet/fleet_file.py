@@ -9,7 +9,6 @@ from typing import Annotated
 import msgspec
 
 from paani.authority import password_of
-from paani.bus.routing import parse_endpoint
 from paani.certificates import require_certificates
 from paani.config import BusConfig
 from paani.errors import UserError
@@ -71,21 +70,20 @@ def _bus_of(path: Path, vessel: FleetVessel) -> BusConfig:
     folder = path.parent / (vessel.credentials or vessel.certificates)
     if not folder.is_dir():
         raise UserError(f"{where}: {folder}: no such folder")
-    config = BusConfig(
-        vessel=vessel.name,
-        domain=vessel.domain,
-        graph=vessel.graph,
-        router=vessel.router,
-        runtime_dir=str(folder) if vessel.credentials else "",
-        certificates=str(folder) if vessel.certificates else "",
-    )
     try:
-        parse_endpoint("router", vessel.router)
+        config = BusConfig(
+            vessel=vessel.name,
+            domain=vessel.domain,
+            graph=vessel.graph,
+            router=vessel.router,
+            runtime_dir=str(folder) if vessel.credentials else "",
+            certificates=str(folder) if vessel.certificates else "",
+        )
         if vessel.certificates:
             if SHORE not in require_certificates(config, (SHORE,)).holders:
                 raise UserError(f"{config.certificates}: {SHORE} has no certificate")
         else:
             password_of(config, SHORE)
-    except UserError as error:
+    except (UserError, ValueError) as error:
         raise UserError(f"{where}: {error}") from error
     return config

@@ -9,11 +9,12 @@ from typing import Any
 
 from paani import keys
 from paani import messages as m
-from paani.authority import OBSERVER, password_of
+from paani.authority import OBSERVER
 from paani.bus import Bus, Latest, open_bus
 from paani.clock import WallClock
 from paani.config import BusConfig
 from paani.errors import UserError
+from paani.port_address import parse_endpoint
 
 CONNECT_S = 1.0
 DEPTH = 1024
@@ -21,11 +22,11 @@ DEPTH = 1024
 
 async def is_up(config: BusConfig) -> bool:
     """Whether something listens at `bus.router`."""
-    host, _, port = config.router.partition("/")[2].rpartition(":")
+    _, host, port = parse_endpoint(config.router)
     try:
         async with asyncio.timeout(CONNECT_S):
-            _, writer = await asyncio.open_connection(host, int(port))
-    except (OSError, ValueError):
+            _, writer = await asyncio.open_connection(host, port)
+    except OSError:
         return False
     writer.close()
     with contextlib.suppress(OSError):
@@ -38,7 +39,6 @@ async def observer(config: BusConfig) -> AsyncIterator[Bus]:
     """A bus that reads everything and writes nothing. Raises UserError when there is no router."""
     if not await is_up(config):
         raise UserError(f"bus.router {config.router}: nothing listens there (`paani up` starts it)")
-    await asyncio.to_thread(password_of, config, OBSERVER)
     bus = await open_bus(config, OBSERVER, WallClock())
     try:
         yield bus

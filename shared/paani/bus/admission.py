@@ -58,7 +58,8 @@ class Admission(Generic[T]):
     def judge(self, data: bytes, now_us: int) -> tuple[T | None, str]:
         """The message and an empty cause, or None and why it was refused.
 
-        A restarted producer has a higher epoch and starts its own sequence; an older epoch never comes back.
+        A restarted producer has a higher epoch and starts its own sequence. An older epoch comes back only where the
+        newer one has not begun by the producer's clock, which for `since_sent` the message itself tells.
         """
         if len(data) > MAX_MESSAGE_BYTES:
             return None, "oversized"

@@ -118,7 +118,7 @@ class Bus:
         """Declare this service alive, which means ready; start its pulse and its health report.
 
         A process that does not hear the bus any more reports no health and no heartbeat, so that whoever supervises it
-        starts it again.
+        starts it again. What fails in reporting ends the service: the context raises it.
         """
         set_loaded_apart()
         token = self._session.liveliness().declare_token(f"{self.prefix}/{keys.alive_name(self.user)}")
@@ -126,8 +126,21 @@ class Bus:
         tasks = [asyncio.create_task(self._report(reporter), name="health")]
         if self.user in keys.BEATING_SERVICES:
             tasks.append(asyncio.create_task(self._beat(), name="pulse"))
+        owner, failures = asyncio.current_task(), list[BaseException]()
+
+        def note_end(task: asyncio.Task[None]) -> None:
+            if owner is not None and not task.cancelled() and (failure := task.exception()) is not None:
+                failures.append(failure)
+                owner.cancel()
+
+        for task in tasks:
+            task.add_done_callback(note_end)
         try:
             yield
+        except asyncio.CancelledError:
+            if failures:
+                raise failures[0] from None
+            raise
         finally:
             for task in tasks:
                 task.cancel()

@@ -8,7 +8,7 @@ import contextlib
 import math
 from typing import Generic, TypeVar
 
-from paani.clock import Clock
+from paani.clock import Clock, steady_beside
 from paani.decider import Input
 
 V = TypeVar("V")
@@ -18,17 +18,21 @@ class Inbox(Generic[V]):
     """Counts and a wake-up that is scheduled at most once."""
 
     def __init__(self, clock: Clock) -> None:
-        self._clock = clock
+        self._clock, self._steady = clock, steady_beside(clock)
         self._loop = asyncio.get_running_loop()
         self._event = asyncio.Event()
         self._armed = False
         self.received = 0
         self.superseded = 0
-        self.received_us = 0
+        self.received_us = self._steady_us = 0
 
     def receipt_age_s(self) -> float:
-        """Seconds since the last message came; infinite before the first."""
-        return (self._clock.now_us() - self.received_us) * 1e-6 if self.received else math.inf
+        """Seconds since the last message came, however the clock was set since; infinite before the first."""
+        return (self._steady.now_us() - self._steady_us) * 1e-6 if self.received else math.inf
+
+    def _note_receipt(self) -> None:
+        self.received += 1
+        self.received_us, self._steady_us = self._clock.now_us(), self._steady.now_us()
 
     def _wake(self) -> None:
         if not self._armed:
@@ -52,10 +56,9 @@ class Latest(Inbox[V]):
 
     def offer(self, value: V) -> None:
         """Called on Zenoh's thread."""
-        self.received += 1
+        self._note_receipt()
         self.superseded += not self._taken
         self.value, self._taken = value, False
-        self.received_us = self._clock.now_us()
         self.newest = Input(value, self.received_us)
         self._wake()
 
@@ -82,10 +85,9 @@ class Queue(Inbox[V]):
 
     def offer(self, value: V) -> None:
         """Called on Zenoh's thread."""
-        self.received += 1
+        self._note_receipt()
         self.superseded += len(self._items) == self._items.maxlen
         self._items.append(value)
-        self.received_us = self._clock.now_us()
         self._wake()
 
     def drain(self) -> list[V]:

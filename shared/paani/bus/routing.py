@@ -14,6 +14,7 @@ from paani.certificates import endpoint, router_settings
 from paani.config import BusConfig
 from paani.errors import UserError
 from paani.link_access import LINK
+from paani.port_address import parse_endpoint
 from paani.sides import ROUTER, Side
 
 # An attempt to connect that takes longer is begun again: TCP itself waits ever longer, 7 s after a cut of 10 s.
@@ -103,29 +104,19 @@ def require_addresses(config: BusConfig) -> None:
             raise UserError(f"{name} {address}: needs certificates (`paani certs make`, then bus.certificates)")
     for name, address in _doors(config).items():
         require_free(name, endpoint(config, address))
-    if config.side is Side.HOST:
-        parse_endpoint("bus.link", config.link)
-
-
-def parse_endpoint(name: str, address: str) -> tuple[str, str, int]:
-    """Scheme, host and port of `tcp/<host>:<port>`. Raises UserError naming the setting."""
-    scheme, _, place = address.partition("/")
-    host, _, port = place.rpartition(":")
-    if scheme not in {"tcp", "tls"} or not host or not port.isdecimal():
-        raise UserError(f"{name} {address}: expected tcp/<host>:<port>")
-    return scheme, host, int(port)
 
 
 def require_free(name: str, address: str) -> None:
-    scheme, host, port = parse_endpoint(name, address)
-    with socket.socket() as probe:
+    """Raises UserError naming the setting where nothing can listen at the address."""
+    _, host, port = parse_endpoint(address)
+    with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET) as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             probe.bind((host, port))
-        except (OSError, OverflowError) as error:
-            if isinstance(error, OSError) and error.errno == errno.EADDRINUSE:
+        except OSError as error:
+            if error.errno == errno.EADDRINUSE:
                 raise UserError(
                     f"{name} {address}: in use by another program, perhaps another `paani up`: stop that, or "
-                    f"choose another port (--set {name}={scheme}/{host}:{port + 1})"
+                    f"choose another port (--set {name}={address.rpartition(':')[0]}:{port + 1})"
                 ) from error
             raise UserError(f"{name} {address}: {error}") from error

@@ -11,6 +11,7 @@ import zenoh
 from paani.authority import password_of, require_place
 from paani.certificates import client_settings, endpoint
 from paani.config import BusConfig
+from paani.port_address import parse_endpoint
 
 LOG = logging.getLogger(__name__)
 RETRY = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 1.5}
@@ -77,10 +78,10 @@ async def open_client(config: BusConfig, user: str) -> zenoh.Session:
 
 async def _reach(config: BusConfig) -> str:
     """Why no session was opened: Zenoh itself does not tell."""
-    host, _, port = config.router.partition("/")[2].rpartition(":")
+    _, host, port = parse_endpoint(config.router)
     try:
         async with asyncio.timeout(REACH_S):
-            _, writer = await asyncio.open_connection(host.strip("[]"), int(port))
+            _, writer = await asyncio.open_connection(host, port)
     except (OSError, TimeoutError):
         return "does not answer"
     writer.close()

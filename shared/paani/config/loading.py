@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import difflib
 import re
 import tomllib
@@ -20,6 +21,7 @@ NOT_SETTINGS = frozenset({"PAANI_DATA", "PAANI_RUNTIME_DIR", "PAANI_CONFIG_JSON"
 MAX_SHOWN = 200  # characters of a setting that an error repeats
 # Earlier names of settings and sections, and their present ones: old files, `--set` paths and recordings still load.
 RENAMED_SETTINGS = {
+    "dashboard.arm_at_start": "up.arm_at_start",
     "perception.gate": "perception.image_quality",
     "perception.fallback_non_water": "advisor.fallback_non_water",
     "perception.fallback_uncertainty": "advisor.fallback_uncertainty",
@@ -44,23 +46,39 @@ def load_config(
     layers.append(_layer("environment", _from_environ(environ or {})))
     layers += [_layer(_set_name(text), _from_set(text)) for text in sets]
 
-    chosen, where = "paani" if profile is None else profile, ""
-    if profile is None:
-        for origin, layer in layers:
-            if "profile" in layer:
-                chosen, where = str(layer["profile"]), f"{origin}: "
-    if chosen not in PROFILES:
-        raise UserError(f"{where}profile: unknown profile '{chosen[:60]}' (one of {', '.join(PROFILES)})")
+    chosen = "paani" if profile is None else _known_profile(profile, "")
+    for origin, layer in layers:
+        if "profile" in layer:
+            named = _known_profile(layer.pop("profile"), f"{origin}: ")
+            chosen = named if profile is None else chosen
 
     tree: dict[str, object] = {}
-    _merge(tree, PROFILES[chosen])
+    _merge(tree, {**PROFILES[chosen], "profile": chosen})
+    steps = []
     for origin, layer in layers:
         _merge(tree, layer)
-        if layer.get("profile") in PROFILES:
-            tree["profile"] = chosen  # a later layer's choice holds for the values of an earlier one
-        _decode(tree, origin)
-    tree["profile"] = chosen
-    return _decode(tree, "configuration")
+        steps.append((origin, copy.deepcopy(tree)))
+    try:
+        return _convert(tree)
+    except UNDECODABLE as error:
+        raise UserError(f"{_where_begun(error, steps)}: {_with_path(str(error))}") from error
+
+
+def _known_profile(named: object, where: str) -> str:
+    if not isinstance(named, str) or named not in PROFILES:
+        raise UserError(f"{where}profile: unknown profile '{str(named)[:60]}' (one of {', '.join(PROFILES)})")
+    return named
+
+
+def _where_begun(error: Exception, steps: Iterable[tuple[str, dict[str, object]]]) -> str:
+    """The layer that brought the fault in: whatever the layers, only what they make together has to hold."""
+    for origin, tree in steps:
+        try:
+            _convert(tree)
+        except UNDECODABLE as earlier:
+            if str(earlier) == str(error):
+                return origin
+    return "configuration"
 
 
 def encode_config(config: Config) -> bytes:
@@ -78,7 +96,7 @@ def decode_config(data: bytes) -> Config:
         profile, tree = recorded.get("profile"), dict[str, object]()
         _merge(tree, PROFILES.get(profile, {}) if isinstance(profile, str) else {})
         _merge(tree, recorded)
-        return msgspec.convert(tree, Config)
+        return _convert(tree, strict=True)
     except UNDECODABLE as error:
         raise UserError(f"configuration: {error}") from error
 
@@ -88,8 +106,14 @@ def with_settings(config: Config, sets: Iterable[str]) -> Config:
     tree: dict[str, object] = msgspec.to_builtins(config)
     texts = tuple(sets)
     for text in texts:
-        _merge(tree, with_present_names(_from_set(text)))
-    return _decode(tree, " ".join(texts))
+        layer = with_present_names(_from_set(text))
+        if "profile" in layer:
+            raise UserError(f"{_set_name(text)}: a configuration's profile stays ({config.profile})")
+        _merge(tree, layer)
+    try:
+        return _convert(tree)
+    except UNDECODABLE as error:
+        raise UserError(f"{' '.join(texts)}: {_with_path(str(error))}") from error
 
 
 def with_present_names(settings: Mapping[str, object]) -> dict[str, object]:
@@ -116,16 +140,27 @@ def _layer(origin: str, settings: Mapping[str, object]) -> tuple[str, dict[str, 
         raise UserError(f"{origin}: settings are not nested that deep") from error
 
 
-def _decode(tree: dict[str, object], origin: str) -> Config:
-    try:
-        return msgspec.convert(tree, Config, strict=False)
-    except UNDECODABLE as error:
-        raise UserError(f"{origin}: {_with_path(str(error))}") from error
+def _convert(tree: dict[str, object], *, strict: bool = False) -> Config:
+    """Raises UNDECODABLE."""
+    _require_text(tree, "")
+    return msgspec.convert(tree, Config, strict=strict)
+
+
+def _require_text(value: object, path: str) -> None:
+    """Raises ValueError naming the field whose text no path or message can hold."""
+    if isinstance(value, dict):
+        for name, each in value.items():
+            _require_text(each, f"{path}.{name}" if path else name)
+    elif isinstance(value, list):
+        for each in value:
+            _require_text(each, path)
+    elif isinstance(value, str) and re.search("[\0\ud800-\udfff]", value):
+        raise ValueError(f"{path}: holds a NUL character, or bytes that are not UTF-8")
 
 
 def _with_path(message: str) -> str:
     """`... - at `$.advisor.x`` becomes `advisor.x: ...`; contradictions name their fields themselves."""
-    text, _, path = message.partition(" - at ")
+    text, _, path = message.rpartition(" - at ") if " - at " in message else (message, "", "")
     path = path.strip("`").removeprefix("$").lstrip(".")
     return (f"{path}: {text}" if path else text) + _suggestion(text, path)
 
@@ -137,7 +172,7 @@ def _suggestion(text: str, path: str) -> str:
         return ""
     section: type = Config
     for part in filter(None, path.split(".")):
-        section = next(field.type for field in msgspec.structs.fields(section) if field.encode_name == part)
+        section = next((field.type for field in msgspec.structs.fields(section) if field.encode_name == part), Config)
     names = [field.encode_name for field in msgspec.structs.fields(section)]
     near = difflib.get_close_matches(unknown[1], names, n=1)
     where = f"{path}." if path else ""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, Literal
 
 import msgspec
@@ -22,7 +23,7 @@ from paani.config.sensors import SensorDevicesConfig
 from paani.config.simulator import AdapterConfig, EyeConfig, PlantConfig, WorldConfig
 from paani.config.thrusters import ThrustersConfig
 from paani.keys import BUTTON, PORTS, Graph
-from paani.port_address import parse_address
+from paani.port_address import parse_address, parse_endpoint
 from paani.sides import Side, services_on
 
 Port = Annotated[int, msgspec.Meta(ge=1, le=65535)]
@@ -51,6 +52,15 @@ class BusConfig(Section, frozen=True):
     graph: Graph = Graph.SIMULATION  # set by the profiles `hil` and `hull` alone; it decides who may write what
     lease_ms: Annotated[int, msgspec.Meta(ge=200, le=10_000)] = 1000  # a link that was silent for so long counts as cut
     max_future_s: Positive = 1.0  # a stamp further ahead than two machines' clocks may differ is refused
+
+    def __post_init__(self) -> None:
+        """Refuse what is no address."""
+        for name, address in (("router", self.router), ("link", self.link), ("shore", self.shore)):
+            if address or name == "router":
+                try:
+                    parse_endpoint(address)
+                except ValueError as error:
+                    raise ValueError(f"{name} {error}") from error
 
 
 class DashboardConfig(Section, frozen=True):
@@ -213,4 +223,4 @@ def is_emulated(line: str) -> bool:
         device, baud = parse_address(line)
     except ValueError:
         return False
-    return device.startswith("/dev/pts/") if baud else device.rpartition(":")[0] == "127.0.0.1"
+    return re.fullmatch(r"/dev/pts/\d+", device) is not None if baud else device.rpartition(":")[0] == "127.0.0.1"

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from paani.errors import UserError
 
-NAME = re.compile(r"\d{8}T\d{6}Z-\d+\.mcap(\.damaged)?")  # with what a repair has set aside
+NAME = re.compile(r"\d{8}T\d{6}Z-\d+\.mcap(\.damaged\d*)?")  # with what a repair has set aside
 KEEP = ".keep"
 
 

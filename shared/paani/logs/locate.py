@@ -15,7 +15,7 @@ from mcap.records import Attachment, Channel, ChunkIndex, Footer, Header, Metada
 
 from paani.errors import UserError
 from paani.logs.layout import DAMAGE, MAGIC, PROFILE, Layout, Span, line_of, messages_in, unpacked_chunk
-from paani.logs.scan import HEAD, Damage, ScannedRecord, content, scan
+from paani.logs.scan import HEAD, Damage, ScannedRecord, content, records_in, scan
 
 FOOTER_BYTES = HEAD.size + 20
 MAX_LOOSE_BYTES = 1 << 20
@@ -150,12 +150,9 @@ def _learn_loose(layout: Layout, data: mmap.mmap, records: list[ScannedRecord]) 
 
 def _learn_messages(layout: Layout, inside: bytes) -> list[int]:
     """Channels and counts; returns the times of the messages [us]."""
-    at = 0
-    while at + HEAD.size <= len(inside):
-        opcode, length = HEAD.unpack_from(inside, at)
-        at += HEAD.size + length
-        if opcode == Opcode.CHANNEL:
-            _learn_channel(layout, inside[at - length : at])
+    for record in records_in(inside):
+        if record.opcode == Opcode.CHANNEL:
+            _learn_channel(layout, content(inside, record))
     times_us = []
     for number, _, log_ns, _ in messages_in(inside, layout.channels):
         topic = layout.channels[number]

@@ -19,6 +19,7 @@ from paani.topic_names import present_name
 
 SUFFIX = ".mcap"
 CONFIG_FILE = "config.json"
+MAX_DIGITS = 9  # of a format's number
 RECORDER = "recorder"  # the metadata record of what the recorder counted by topic
 
 
@@ -164,8 +165,8 @@ def _take_present_names(layout: Layout) -> None:
 def _require_known_format(layout: Layout) -> None:
     """Later formats may say other things in the same words."""
     version = layout.metadata.get(PROFILE, {}).get("format", "")
-    if version.isdecimal() and int(version) > FORMAT:
-        raise UserError(f"{layout.path}: recorded in format {version}; this program reads up to {FORMAT}")
+    if version.isdecimal() and (len(version) > MAX_DIGITS or int(version) > FORMAT):
+        raise UserError(f"{layout.path}: recorded in format {version[:MAX_DIGITS]}; this program reads up to {FORMAT}")
 
 
 def _require_one_drive(path: Path, parts: list[Layout]) -> None:

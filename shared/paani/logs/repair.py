@@ -5,6 +5,7 @@ from __future__ import annotations
 import collections
 import contextlib
 import fcntl
+import itertools
 import mmap
 import os
 import struct
@@ -37,11 +38,21 @@ from mcap.records import (
 from paani.errors import UserError
 from paani.logs.layout import MAGIC, PROFILE
 from paani.logs.locate import has_damaged_summary
-from paani.logs.scan import HEAD, Damage, Data, ScannedRecord, content, records_in, scan, stream_of, unpacked
+from paani.logs.scan import (
+    HEAD,
+    MESSAGE,
+    Damage,
+    Data,
+    ScannedRecord,
+    content,
+    records_in,
+    scan,
+    stream_of,
+    unpacked,
+)
 from paani.whole_file import replacement_file
 
 FOOTER_BYTES = HEAD.size + 20
-_MESSAGE = struct.Struct("<HIQQ")
 
 
 class Repaired(msgspec.Struct, frozen=True, kw_only=True):
@@ -62,7 +73,7 @@ class Interrupted(Exception):
 
 
 class InUse(UserError):
-    """A recorder has the file open."""
+    """A recorder, or another repair, has the file open."""
 
 
 def is_finished(path: Path) -> bool:
@@ -85,7 +96,9 @@ def repair(path: Path, told_to_stop: Callable[[], bool] = lambda: False) -> Repa
         with path.open("rb") as file:
             if not file.seek(0, os.SEEK_END):
                 raise UserError(f"{path}: empty file")
-            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if not os.path.samestat(os.fstat(file.fileno()), path.stat()):
+                raise InUse(f"{path}: has just been repaired")
             with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
                 return _repair(path, data, told_to_stop)
     except BlockingIOError as error:
@@ -118,8 +131,7 @@ def _repair(path: Path, data: mmap.mmap, told_to_stop: Callable[[], bool]) -> Re
             file.flush()
             os.fsync(file.fileno())
         if any(d.end < len(data) for d in damage):
-            original = path.with_name(path.name + ".damaged")
-            _keep(path, original)
+            original = _keep(path)
     return Repaired(path=path, changed=True, messages=mended.messages, lost=lost, original=original)
 
 
@@ -193,7 +205,7 @@ class Mended:
         indexes: dict[int, MessageIndex] = {}
         for opcode, at, _ in records_in(inside):
             if opcode == Opcode.MESSAGE:
-                number, _, log_ns, _ = _MESSAGE.unpack_from(inside, at + HEAD.size)
+                number, _, log_ns, _ = MESSAGE.unpack_from(inside, at + HEAD.size)
                 indexes.setdefault(number, MessageIndex(number, [])).records.append((log_ns, at))
                 self._counts[number] += 1
         return indexes
@@ -317,13 +329,17 @@ def _require_ours(path: Path, data: Data, pieces: list[ScannedRecord | Damage]) 
         raise UserError(f"{path}: not an MCAP file")
 
 
-def _keep(path: Path, original: Path) -> None:
-    """A second name for the file, or where the disk has none to give, its only one for a moment."""
-    original.unlink(missing_ok=True)
+def _keep(path: Path) -> Path:
+    """A second name for the file, or where the disk has none to give, its only one for a moment. No other is lost."""
+    names = (path.with_name(f"{path.name}.damaged{number or ''}") for number in itertools.count())
+    original = next(name for name in names if not name.exists() or name.samefile(path))
+    if original.exists():
+        return original
     try:
         os.link(path, original)
     except OSError:
         path.rename(original)
+    return original
 
 
 def repair_all(folder: Path, told_to_stop: Callable[[], bool]) -> list[str]:

@@ -20,6 +20,8 @@ HEAD = struct.Struct("<BQ")
 # In a chunk: opcode and length, two times, size, checksum, then the name of the compression.
 ZSTD_MARK, MARK_AT = b"\x04\x00\x00\x00zstd", HEAD.size + 28
 OPCODES = frozenset(opcode.value for opcode in Opcode)
+INSIDE_CHUNKS = frozenset({Opcode.SCHEMA.value, Opcode.CHANNEL.value, Opcode.MESSAGE.value})
+MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, two times; then the payload
 
 Data = bytes | mmap.mmap
 
@@ -112,7 +114,8 @@ def _fault(data: Data, record: ScannedRecord) -> str:
                 chunk = Chunk.read(stream)
                 if chunk.uncompressed_size > MAX_CHUNK_BYTES:
                     return f"a chunk of {chunk.uncompressed_size} bytes"
-                get_chunk_data_stream(chunk, validate_crc=True)
+                unpacked_stream, length = get_chunk_data_stream(chunk, validate_crc=True)
+                return _fault_inside(unpacked_stream.read(length))
             case Opcode.ATTACHMENT:
                 Attachment.read(stream)
                 if any(inside[-4:]) and zlib.crc32(inside[:-4]) != int.from_bytes(inside[-4:], "little"):
@@ -125,11 +128,19 @@ def _fault(data: Data, record: ScannedRecord) -> str:
                 Channel.read(stream)
             case Opcode.METADATA:
                 Metadata.read(stream)
+            case Opcode.MESSAGE if len(inside) < MESSAGE.size:
+                return f"a message of {len(inside)} bytes"
             case _:
                 return ""
     except DAMAGE as error:
         return (str(error) or type(error).__name__).splitlines()[0][:80]
     return "" if record.opcode == Opcode.ATTACHMENT or stream.count == len(inside) else "a record of the wrong length"
+
+
+def _fault_inside(records: bytes) -> str:
+    """What is wrong with the first record of a chunk that cannot be read: a chunk need not have a checksum."""
+    faults = (_fault(records, each) for each in records_in(records) if each.opcode in INSIDE_CHUNKS)
+    return next(filter(None, faults), "")
 
 
 def _resume(data: Data, at: int, damaged: ScannedRecord) -> int:

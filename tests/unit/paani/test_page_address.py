@@ -6,19 +6,8 @@ import pytest
 
 from paani.config import load_config
 from paani.errors import UserError
-from paani.page_address import is_loopback, is_page_exposed, page_origin
+from paani.page_address import is_page_exposed, page_origin
 from paani_tools.up.plan import make_plan
-
-
-@pytest.mark.parametrize(
-    ("host", "ours"),
-    [
-        ("127.0.0.1", True), ("127.8.0.1", True), ("::1", True), ("localhost", True), ("0.0.0.0", False),
-        ("::", False), ("192.168.4.1", False), ("localhost.example", False), ("boat.local", False), ("", False),
-    ],
-)  # fmt: skip
-def test_only_what_nobody_else_reaches_is_loopback(host: str, ours: bool) -> None:
-    assert is_loopback(host) is ours
 
 
 @pytest.mark.parametrize(

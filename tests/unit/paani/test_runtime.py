@@ -9,9 +9,11 @@ from pathlib import Path
 
 import pytest
 
+from paani.authority import ensure_credentials, password_of
 from paani.config import BusConfig
 from paani.errors import UserError
-from paani.runtime import own_runtime_dir, require_unowned_runtime_dir, runtime_dir
+from paani.operator_key import KEY_FILE, ensure_operator_key
+from paani.runtime import own_runtime_dir, require_unowned_runtime_dir, runtime_dir, write_private
 
 
 def test_a_folder_is_made_for_its_owner_alone(tmp_path: Path) -> None:
@@ -59,3 +61,34 @@ def test_a_latch_has_one_boat_and_a_killed_one_leaves_it(tmp_path: Path) -> None
     with own_runtime_dir(config) as folder:
         assert folder == runtime_dir(config)
     require_unowned_runtime_dir(config)
+
+
+def test_a_private_file_that_cannot_be_written_leaves_nothing_beside(tmp_path: Path) -> None:
+    (tmp_path / "key").mkdir()
+    with pytest.raises(OSError, match="directory"):
+        write_private(tmp_path / "key", "secret")
+    assert [path.name for path in tmp_path.iterdir()] == ["key"]
+
+
+def test_credentials_that_cannot_be_made_are_named_and_leave_nothing(tmp_path: Path) -> None:
+    config = BusConfig(runtime_dir=str(tmp_path))
+    (tmp_path / "credentials").touch()
+    with pytest.raises(UserError, match=r"credentials: Not a directory"):
+        ensure_credentials(config)
+    assert [path.name for path in tmp_path.iterdir()] == ["credentials"]
+    (tmp_path / "credentials").unlink()
+    (ensure_credentials(config) / "advisor").write_bytes(b"\xff\xfe")
+    with pytest.raises(UserError, match=r"advisor: no password"):
+        password_of(config, "advisor")
+
+
+@pytest.mark.parametrize("text", ["", "\n", "short\n"])
+def test_a_key_that_was_cut_off_lets_nobody_in(tmp_path: Path, text: str) -> None:
+    config = BusConfig(runtime_dir=str(tmp_path))
+    key = ensure_operator_key(config)
+    path = tmp_path / KEY_FILE
+    path.write_text(f"{key}\n")
+    assert ensure_operator_key(config) == key
+    path.write_text(text)
+    with pytest.raises(UserError, match=r"operator-key: a key has at least 8 characters"):
+        ensure_operator_key(config)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import os
 from pathlib import Path
 
 import pytest
@@ -66,3 +67,18 @@ def test_a_folder_is_whole_or_absent(tmp_path: Path) -> None:
 def test_a_folder_that_exists_is_not_written_into(tmp_path: Path) -> None:
     with pytest.raises(UserError, match=f"^--csv {tmp_path}: already exists$"), new_folder(tmp_path, "--csv"):
         pass
+
+
+def test_a_link_stays_one_and_a_pipe_is_written_to_as_it_is(tmp_path: Path) -> None:
+    target, link, pipe = tmp_path / "target", tmp_path / "link", tmp_path / "pipe"
+    target.write_bytes(b"old")
+    link.symlink_to(target)
+    write_whole(link, b"new")
+    assert (link.is_symlink(), target.read_bytes()) == (True, b"new")
+    os.mkfifo(pipe)
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    try:
+        write_whole(pipe, b"new")
+        assert (pipe.is_fifo(), os.read(reader, 8)) == (True, b"new")
+    finally:
+        os.close(reader)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import math
+import time
 from collections.abc import Callable
 
 import pytest
 
 from paani.bus.inbox import Latest, Queue
-from paani.clock import ManualClock
+from paani.clock import ManualClock, WallClock
 from paani.decider import Input
 
 START_US = 7_000_000
@@ -123,3 +124,15 @@ async def test_many_messages_wake_the_loop_once(clock: ManualClock, monkeypatch:
     await asyncio.sleep(0.0)
     inbox.offer(5)
     assert len(wakes) == 2
+
+
+async def test_a_wall_clock_that_is_set_makes_no_message_younger(monkeypatch: pytest.MonkeyPatch) -> None:
+    inbox = Latest[str](WallClock())
+    inbox.offer("a")
+    hour_ns = 3_600_000_000_000
+    monkeypatch.setattr(time, "time_ns", lambda: inbox.received_us * 1000 - hour_ns)
+    assert 0.0 <= inbox.receipt_age_s() < 60.0
+    later_ns = time.monotonic_ns() + hour_ns
+    monkeypatch.setattr(time, "monotonic_ns", lambda: later_ns)
+    assert inbox.receipt_age_s() > 3500.0
+    assert inbox.fresh(0.3) is None

@@ -38,6 +38,13 @@ def test_later_layers_win(tmp_path: Path) -> None:
         ("profile=fancy", "profile: unknown profile 'fancy'"),
         ("nonsense", "expected section.field=value"),
         ("advisor.lifetime_s=0.1", "advisor.evidence_max_age_s exceeds advisor.lifetime_s"),
+        ("bus.router=foo", "bus: router foo: expected tcp/HOST:PORT"),
+        ("bus.link=tcp/127.0.0.1:99999", "bus: link tcp/127.0.0.1:99999: expected tcp/HOST:PORT"),
+        ("bus.shore=udp/127.0.0.1:7447", "bus: shore udp/127.0.0.1:7447: expected tcp/HOST:PORT"),
+        ('bus.runtime_dir="a\\u0000b"', "bus.runtime_dir: holds a NUL character"),
+        ("navigator.route=a\udcff.toml", "navigator.route: holds a NUL character, or bytes that are not UTF-8"),
+        ('profile=["paper"]', "profile: unknown profile '['paper']'"),
+        ('"a` - at `$.zzz"=1', "Object contains unknown field"),
     ],
 )
 def test_a_bad_setting_is_one_line_that_names_it(setting: str, line: str) -> None:
@@ -185,3 +192,20 @@ def test_every_number_has_both_bounds() -> None:
 
 def test_defaults_are_valid() -> None:
     assert load_config() == Config()
+
+
+def test_what_settings_make_together_has_to_hold_whatever_their_order() -> None:
+    faster = ["navigator.cruise_mps=2.9", "controller.max_speed_mps=3.0"]
+    assert load_config(sets=faster) == load_config(sets=faster[::-1])
+    with pytest.raises(UserError, match=r"^--set navigator\.cruise_mps=2\.9: navigator\.cruise_mps 2\.9 exceeds"):
+        load_config(sets=["camera.rate_hz=4.0", faster[0], "eye.camera_forward_m=0.2"])
+
+
+def test_a_configuration_keeps_the_profile_that_its_values_are_of() -> None:
+    with pytest.raises(UserError, match=r"^--set profile=paper: a configuration's profile stays \(paani\)"):
+        with_settings(Config(), ["profile=paper"])
+
+
+def test_what_was_the_dashboards_is_the_starts() -> None:
+    recorded = encode_config(Config()).replace(b'"dashboard":{', b'"dashboard":{"arm_at_start":true,')
+    assert decode_config(recorded.replace(b'"up":{"arm_at_start":false,', b'"up":{')).up.arm_at_start

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import collections
 import functools
+import struct
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -18,7 +19,7 @@ from mcap.writer import Writer
 from paani.errors import UserError
 from paani.logs.reader import open_log
 from paani.logs.repair import Interrupted, is_finished, repair, repair_all
-from paani.logs.scan import Damage, ScannedRecord, scan
+from paani.logs.scan import HEAD, Damage, ScannedRecord, scan
 from tests.unit.paani.logs.small_logs import NAME, begin, finished, unfinished
 
 pytestmark = pytest.mark.slow
@@ -246,3 +247,56 @@ def test_a_damaged_summary_is_written_anew(tmp_path: Path) -> None:
     assert (repaired.changed, repaired.lost) == (True, ())
     assert open_log(path).problems == []
     assert poses(path) == list(range(N))
+
+
+def test_a_second_repair_finds_the_file_in_use_and_no_original_is_lost(tmp_path: Path) -> None:
+    data = bytearray(whole())
+    data[chunks(whole())[2].start + 60] ^= 0xFF
+    path = write(tmp_path, bytes(data))
+    second: list[str] = []
+
+    def interrupt() -> bool:
+        second.append(refusal(lambda: repair(path)))
+        return False
+
+    first = repair(path, interrupt).original
+    assert first is not None
+    assert set(second) == {f"{path}: is being written"}
+    again = bytearray(path.read_bytes())
+    again[chunks(bytes(again))[1].start + 60] ^= 0xFF
+    path.write_bytes(bytes(again))
+    other = repair(path).original
+    assert other == tmp_path / (NAME + ".damaged1")
+    assert (first.read_bytes(), other.read_bytes()) == (bytes(data), bytes(again))
+
+
+BAD_RECORDS = {
+    "a cut channel": (Opcode.CHANNEL, b"\x01"),
+    "a topic that is no text": (Opcode.CHANNEL, b"\x01\x00\x00\x00\x01\x00\x00\x00\xff" + bytes(8)),
+    "a cut schema": (Opcode.SCHEMA, b"\x01\x00\xff"),
+    "a short message": (Opcode.MESSAGE, bytes(10)),
+}
+
+
+@pytest.mark.parametrize("bad", BAD_RECORDS)
+def test_what_a_chunk_without_a_checksum_holds_is_damage(tmp_path: Path, bad: str) -> None:
+    opcode, inside = BAD_RECORDS[bad]
+    records = HEAD.pack(opcode, len(inside)) + inside
+    content = struct.pack("<QQQIIQ", 0, 0, len(records), 0, 0, len(records)) + records
+    first = chunks(whole())[0]
+    path = write(
+        tmp_path, whole()[: first.start] + HEAD.pack(Opcode.CHUNK, len(content)) + content + whole()[first.start :]
+    )
+    assert refusal(lambda: read(path)) == ""
+    assert repair(path).lost
+    assert poses(path) == list(range(N))
+
+
+def test_a_format_of_more_digits_than_a_number_has_is_a_later_one(tmp_path: Path) -> None:
+    path = tmp_path / NAME
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start("paani")
+        writer.add_metadata("paani", {"format": "9" * 5000})
+        writer.finish()
+    assert "this program reads up to" in refusal(lambda: open_log(path))

@@ -47,7 +47,7 @@ def test_a_vessel_is_joined_by_its_own_credential(fleet: Path) -> None:
     [
         (OTTER * 2, "vessel otter: there twice"),
         (OTTER + OTTER.replace('"otter"', '"beaver"', 1), r"vessel beaver: router tcp/10.0.0.2:7450 is otter's"),
-        (OTTER.replace("tcp/10.0.0.2:7450", "10.0.0.2"), r"vessel otter: router 10.0.0.2: expected tcp/<host>:<port>"),
+        (OTTER.replace("tcp/10.0.0.2:7450", "10.0.0.2"), r"vessel otter: router 10.0.0.2: expected tcp/HOST:PORT"),
         (OTTER.replace('credentials = "otter"', ""), "vessel otter: expected credentials or certificates"),
         (OTTER + 'certificates = "x"', "vessel otter: expected credentials or certificates"),
         (OTTER.replace('credentials = "otter"', 'credentials = "none"'), "vessel otter: .*none: no such folder"),
