@@ -69,18 +69,19 @@ class ManualClock:
 MIN_STEP_S = 0.1  # a clock that is only slewed differs by less between two looks
 
 
-class ClockStep:
-    """Tells when a clock was set, by one that never is."""
+class WallTime:
+    """What to add to a time by a clock that is never set, for a stamp by one that may be."""
 
     def __init__(self, clock: Clock, steady: Clock) -> None:
         self._clock, self._steady = clock, steady
-        self._difference_us = clock.now_us() - steady.now_us()
+        self._offset_us = clock.now_us() - steady.now_us()
 
-    def take_us(self) -> int:
-        """By how much the clock was set since the last call, ahead if positive; 0 if it was not."""
-        difference_us = self._clock.now_us() - self._steady.now_us()
-        step_us, self._difference_us = difference_us - self._difference_us, difference_us
-        return step_us if abs(step_us) > MIN_STEP_S * 1e6 else 0
+    def offset_us(self) -> int:
+        """The same from call to call, until the clock is set."""
+        offset_us = self._clock.now_us() - self._steady.now_us()
+        if abs(offset_us - self._offset_us) > MIN_STEP_S * 1e6:
+            self._offset_us = offset_us
+        return self._offset_us
 
 
 def has_passed(since_us: int, span_us: float, now_us: int) -> bool:

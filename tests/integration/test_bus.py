@@ -191,8 +191,8 @@ async def test_alive_means_ready(open_as: OpenAs, spawn: Spawn) -> None:
 async def test_a_report_that_fails_ends_the_service(open_as: OpenAs, config: Config) -> None:
     bus, folder = await open_as("controller"), Path(config.bus.runtime_dir)
     beside = folder.with_name("elsewhere")
-    folder.rename(beside)
-    folder.symlink_to(beside)
+    await asyncio.to_thread(folder.rename, beside)
+    await asyncio.to_thread(folder.symlink_to, beside)
     with pytest.raises(UserError, match=r"bus\.runtime_dir .*: is a link"), bus.alive():
         await asyncio.Event().wait()
 

@@ -75,7 +75,9 @@ def test_every_file_that_a_package_says_it_has_is_there_and_its_links_lead_somew
             assert "://" in link or (page.parent / link).exists(), f"{page.relative_to(ROOT)}: {link}"
         for table in re.findall(r"^\| (?:file|module) \|.*\n((?:\|.*\n)+)", text, flags=re.MULTILINE):
             for name in re.findall(r"`([\w./-]+)`", "".join(row.split("|")[1] for row in table.splitlines())):
-                is_there = any(page.parent.rglob(name)) or any((ROOT / folder / name).exists() for folder in ("", *FOLDERS))
+                is_there = any(page.parent.rglob(name)) or any(
+                    (ROOT / folder / name).exists() for folder in ("", *FOLDERS)
+                )
                 assert is_there, f"{page.relative_to(ROOT)}: {name}"
 
 

@@ -67,12 +67,6 @@ class AisReports:
         newest = sorted(self._vessels.values(), key=lambda each: (-each.fixed_us, each.mmsi))
         return tuple(self._with_size(each) for each in newest[:MAX_VESSELS])
 
-    def shift_clock(self, step_us: int) -> None:
-        """The clock that `now_us` comes from was set, ahead if positive."""
-        for known in (self._vessels, self._doubted):
-            for mmsi, each in known.items():
-                known[mmsi] = msgspec.structs.replace(each, fixed_us=max(each.fixed_us + step_us, 0))
-
     def _take_report(self, report: Any, now_us: int) -> bool:
         kind, mmsi = int(report.msg_type), int(report.mmsi)
         if mmsi == self._own_mmsi and mmsi:
@@ -133,7 +127,7 @@ class AisReports:
 
 
 def _is_over(told_us: int, memory_s: float, now_us: int) -> bool:
-    return abs(now_us - told_us) * 1e-6 > memory_s
+    return (now_us - told_us) * 1e-6 > memory_s
 
 
 def _vessel(mmsi: int, report: Any, now_us: int) -> AisVessel | None:

@@ -43,10 +43,6 @@ class DepthDecoder:
             return Depth(source_us=self._last_us, available=False)
         return Depth(source_us=self._last_us, depth_m=below_m + self._transducer_m)
 
-    def shift_clock(self, step_us: int) -> None:
-        """The clock that `now_us` comes from was set, ahead if positive."""
-        self._last_us = max(self._last_us + step_us, 0)
-
 
 def _depth_below_transducer_m(sentence: Sentence) -> float | None:
     """In metres, or in feet where a DBT gives those alone; None where all its fields are empty."""

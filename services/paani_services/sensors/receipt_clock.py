@@ -2,8 +2,8 @@
 
 Data that waited on the way, in a buffer or behind a broken network link, come in a piece and are old. The device's
 clock tells: the shortest time that data ever took from there is taken for the way itself; what took longer has waited.
-A way that has become longer for all data is no way: nothing but a clock that was set is followed, and whoever set it
-says so (`shift`, or a clock made anew).
+A way that has become longer for all data is no way: our clock is one that is never set, and for a device's that was, a
+clock is made anew.
 """
 
 CLOCK_DRIFT = 2e-4  # two cheap crystals differ by less; so fast the shortest way is forgotten
@@ -24,12 +24,6 @@ class ReceiptClock:
             self._offset_us = offset_us
         self._offset_us += min(CLOCK_DRIFT * (now_us - self._observed_us), offset_us - self._offset_us)
         self._observed_us = now_us
-
-    def shift(self, step_us: int) -> None:
-        """Our clock was set, ahead if positive."""
-        if self._offset_us is not None:
-            self._offset_us += step_us
-            self._observed_us += step_us
 
     def date(self, device_us: int) -> int | None:
         """When data of this time were measured, plus the way itself; None for what waited too long."""

@@ -5,10 +5,12 @@ from collections import Counter
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 
+import msgspec
+
 from paani import keys
 from paani import messages as m
 from paani.bus import Bus
-from paani.clock import Clock, ClockStep, MonotonicClock, has_passed
+from paani.clock import Clock, MonotonicClock, WallTime, has_passed
 from paani.config import Config
 from paani.config.sensors import recording_of
 from paani.serial_port import PortError, open_port
@@ -23,11 +25,13 @@ REPORT_S = 1.0
 async def run(bus: Bus, clock: Clock, config: Config) -> None:
     """Publish what the devices say, and their state once a second."""
     suite = SensorSuite(config.sensors)
-    step = ClockStep(clock, MonotonicClock())
+    steady = MonotonicClock()
+    wall_time = WallTime(clock, steady)
     gps, imu, state = bus.publisher(keys.GPS), bus.publisher(keys.IMU), bus.publisher(keys.SENSORS_STATE)
     ais, scan, depth = bus.publisher(keys.AIS), bus.publisher(keys.SCAN), bus.publisher(keys.DEPTH)
 
     def publish(reading: Reading) -> None:
+        reading = reading.dated(wall_time.offset_us())
         for fix in reading.fixes:
             gps.put(fix)
         for sample in reading.samples:
@@ -40,15 +44,16 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
     with bus.alive():
         async with asyncio.TaskGroup() as group:
             for address in suite.lines:
-                group.create_task(_serve_line(address, suite, publish, clock, step))
+                group.create_task(_serve_line(address, suite, publish, steady))
             counted = Counter[str]()
             while True:
-                now_us = clock.now_us()
-                devices = suite.report(now_us)
+                now_us, steady_us = clock.now_us(), steady.now_us()
+                devices = suite.report(steady_us)
                 state.put(m.SensorsState(source_us=now_us, devices=devices))
-                vessels = suite.vessels(now_us)
+                vessels = suite.vessels(steady_us)
                 if vessels is not None:
-                    ais.put(m.AisVessels(source_us=now_us, vessels=vessels))
+                    told = tuple(_dated_fix(each, wall_time.offset_us()) for each in vessels)
+                    ais.put(m.AisVessels(source_us=now_us, vessels=told))
                 bus.note(_summary(devices))
                 for cause, n in (suite.drops - counted).items():
                     bus.count_drop(cause, n)
@@ -56,21 +61,21 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
                 await asyncio.sleep(REPORT_S)
 
 
-async def _serve_line(
-    address: str, suite: SensorSuite, publish: Callable[[Reading], None], clock: Clock, step: ClockStep
-) -> None:
+def _dated_fix(vessel: m.AisVessel, offset_us: int) -> m.AisVessel:
+    return msgspec.structs.replace(vessel, fixed_us=max(vessel.fixed_us + offset_us, 0))
+
+
+async def _serve_line(address: str, suite: SensorSuite, publish: Callable[[Reading], None], steady: Clock) -> None:
     """Open a line, and open it again whenever it is lost."""
     backoff = Backoff()
     while True:
         frames = suite.lines[address].frames
         try:
-            async for data in _play_file(address) if address.startswith("file:") else _read_port(address, clock):
-                suite.shift_clock(step.take_us())
-                now_us = clock.now_us()
+            async for data in _play_file(address) if address.startswith("file:") else _read_port(address, steady):
                 if data is None:
-                    suite.opened(address, now_us)
+                    suite.opened(address, steady.now_us())
                 else:
-                    publish(suite.take(address, data, now_us))
+                    publish(suite.take(address, data, steady.now_us()))
         except PortError as error:
             wait_s = backoff.after(is_useful=suite.lines[address].frames > frames)
             suite.lost(address, f"{error}; next try after {wait_s:g} s")
@@ -80,15 +85,15 @@ async def _serve_line(
             return
 
 
-async def _read_port(address: str, clock: Clock) -> AsyncIterator[bytes | None]:
+async def _read_port(address: str, steady: Clock) -> AsyncIterator[bytes | None]:
     """None once the device is open, then its bytes. Raises PortError when it is not to be had, gone, or babbles."""
     port = await open_port(address)
     try:
         yield None
-        began_us, n = clock.now_us(), 0
+        began_us, n = steady.now_us(), 0
         while True:
             data = await port.read()
-            now_us = clock.now_us()
+            now_us = steady.now_us()
             if has_passed(began_us, 1e6, now_us):
                 began_us, n = now_us, 0
             n += len(data)

@@ -1,16 +1,17 @@
 """All devices of a hull together: bytes of their lines in, fixes and samples out. Pure.
 
-Data that cannot be believed are withheld, so that who needs them finds them stale and stops the boat.
+`now_us`, and so every stamp that comes out, is by a clock that is never set; `Reading.dated` makes stamps of the wall
+clock. Data that cannot be believed are withheld, so that who needs them finds them stale and stops the boat.
 """
 
 from collections import Counter
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import msgspec
 
 from paani.config import SensorDevicesConfig
-from paani.messages import AisVessel, Depth, GpsFix, ImuSample, RangeScan, SensorDevice, SensorRole
+from paani.messages import AisVessel, Depth, GpsFix, ImuSample, Message, RangeScan, SensorDevice, SensorRole
 from paani_services.sensors.ais_reports import SENTENCE, AisReports
 from paani_services.sensors.depth_sentences import DEPTH_SENTENCES, DepthDecoder
 from paani_services.sensors.device import Device, Line
@@ -39,6 +40,8 @@ NO_GRAVITY = "its acceleration is not that of gravity: does it write m/s^2? Its 
 LATE = "its data come over a second late: they are withheld"
 MAX_SPACING_US = 200_000  # between samples that come in one piece: no inertial unit is slower than 5 Hz
 
+M = TypeVar("M", bound=Message)
+
 
 class Reading(NamedTuple):
     """What to publish."""
@@ -47,6 +50,19 @@ class Reading(NamedTuple):
     samples: tuple[ImuSample, ...] = ()
     scans: tuple[RangeScan, ...] = ()
     depths: tuple[Depth, ...] = ()
+
+    def dated(self, offset_us: int) -> "Reading":
+        """The same by a clock that is so much ahead."""
+        return Reading(
+            tuple(_dated(each, offset_us) for each in self.fixes),
+            tuple(_dated(each, offset_us) for each in self.samples),
+            tuple(_dated(each, offset_us) for each in self.scans),
+            tuple(_dated(each, offset_us) for each in self.depths),
+        )
+
+
+def _dated(message: M, offset_us: int) -> M:
+    return msgspec.structs.replace(message, source_us=max(message.source_us + offset_us, 0))
 
 
 class SensorSuite:
@@ -99,14 +115,6 @@ class SensorSuite:
     def lost(self, address: str, problem: str) -> None:
         """A line cannot be opened, or is gone."""
         self._lines[address].lost(problem)
-
-    def shift_clock(self, step_us: int) -> None:
-        """The clock that `now_us` comes from was set, ahead if positive."""
-        self._fix_clock.shift(step_us)
-        self._sample_clock.shift(step_us)
-        self._ais.shift_clock(step_us)
-        self._depths.shift_clock(step_us)
-        self._fix_us, self._sample_us = max(self._fix_us + step_us, 0), max(self._sample_us + step_us, 0)
 
     def take(self, address: str, data: bytes, now_us: int) -> Reading:
         """What the bytes of a line say that have just come."""

@@ -103,11 +103,9 @@ def test_a_vessel_that_jumps_is_believed_when_its_next_report_bears_that_out() -
     assert receiver.drops == {"ais_jumped": 2}
 
 
-def test_a_vessel_that_is_silent_is_forgotten_and_a_set_clock_changes_nothing() -> None:
+def test_a_vessel_that_is_silent_is_forgotten() -> None:
     receiver = Receiver()
     receiver.at(0.0)
-    receiver.now_us -= 3_600_000_000
-    receiver.reports.shift_clock(-3_600_000_000)
     receiver.wait(MEMORY_S - 1.0)
     assert set(receiver.longitudes_deg()) == {BARGE}
     receiver.wait(2.0)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pytest
 
-from paani.clock import ClockStep, ManualClock
 from paani_services.sensors.receipt_clock import ReceiptClock
 
 AHEAD_US = 1_700_000_000_000_000
@@ -30,36 +29,9 @@ def test_two_clocks_may_drift_apart() -> None:
         assert now_us - at_us < 100
 
 
-@pytest.mark.parametrize("step_us", [60_000_000, -60_000_000])
-def test_our_clock_that_was_set_is_followed_at_once(step_us: int) -> None:
-    clock = ReceiptClock()
-    for step in range(40):
-        if step == 20:
-            clock.shift(step_us)
-        now_us = AHEAD_US + 200_000 * step + (step_us if step >= 20 else 0)
-        clock.observe(200_000 * step, now_us)
-        assert clock.date(200_000 * step) == now_us
-
-
 def test_a_way_that_has_become_longer_for_good_is_never_taken_for_a_clock() -> None:
     """Ten minutes behind a link that keeps everything for two seconds: nothing of it is dated."""
     clock = ReceiptClock()
     for step in range(3000):
         clock.observe(200_000 * step, AHEAD_US + 200_000 * step + (2_000_000 if step > 20 else 0))
         assert (clock.date(200_000 * step) is None) is (step > 20)
-
-
-def test_only_a_real_step_of_a_clock_is_one() -> None:
-    wall, steady = ManualClock(), ManualClock()
-    step = ClockStep(wall, steady)
-    for set_s, expected_us in ((0.0, 0), (0.05, 0), (3600.0, 3_600_000_000), (0.0, 0), (-3600.0, -3_600_000_000)):
-        wall.advance(1.0 + set_s)
-        steady.advance(1.0)
-        assert step.take_us() == expected_us
-
-
-def test_a_clock_that_was_set_back_is_followed_at_once() -> None:
-    clock = ReceiptClock()
-    clock.observe(1_000_000, AHEAD_US)
-    clock.observe(1_200_000, AHEAD_US - 60_000_000)
-    assert clock.date(1_200_000) == AHEAD_US - 60_000_000

@@ -122,19 +122,10 @@ def test_data_that_all_come_late_are_named_and_withheld_for_as_long_as_they_do()
     assert "late" in device.note
 
 
-@pytest.mark.parametrize("step_s", [3600.0, -3600.0])
-def test_a_board_whose_clock_was_set_goes_on_with_stamps_of_the_new_time(step_s: float) -> None:
+def test_what_is_read_is_dated_by_the_wall_clock() -> None:
     bench = Bench()
-    bench.run_imu(0.5)
-    for second in range(10, 20):
-        bench.wait(1.0)
-        if second == 15:
-            bench.wait(step_s)
-            bench.suite.shift_clock(round(step_s * 1e6))
-        (fix,) = bench.fixes(rmc(f"1235{second}"))
-        assert fix.source_us == pytest.approx(bench.now_us - 100_000, abs=10_000)
-        (sample,) = bench.samples(bench.noisy(round(1000 * second)))
-        assert sample.source_us == bench.now_us
+    (fix,) = bench.suite.take(GPS, rmc("123510"), bench.now_us).dated(-3_600_000_000).fixes
+    assert fix.source_us == pytest.approx(bench.now_us - 3_600_100_000, abs=10_000)
 
 
 def test_a_receiver_whose_clock_was_set_back_is_believed_again_at_once() -> None:
