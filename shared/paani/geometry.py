@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+from paani import portable
+
 # WGS 84 (NIMA TR8350.2, table 3.1): semi-major axis [m], first eccentricity squared.
 SEMI_MAJOR_M = 6_378_137.0
 ECCENTRICITY2 = 6.694379990141317e-3
@@ -47,11 +49,11 @@ def geodetic_from_enu(
 
 
 def _metres_per_degree(latitude_deg: float) -> tuple[float, float]:
-    sine = math.sin(math.radians(latitude_deg))
+    sine = portable.sin(math.radians(latitude_deg))
     w2 = 1.0 - ECCENTRICITY2 * sine * sine
     prime_vertical_m = SEMI_MAJOR_M / math.sqrt(w2)
     meridian_m = prime_vertical_m * (1.0 - ECCENTRICITY2) / w2
-    cosine = math.cos(math.radians(latitude_deg))
+    cosine = portable.cos(math.radians(latitude_deg))
     return math.radians(prime_vertical_m * cosine), math.radians(meridian_m)
 
 

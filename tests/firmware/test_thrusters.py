@@ -125,6 +125,28 @@ async def test_a_killed_process_leaves_the_thrusters_still_within_its_lease(tmp_
                 assert not any(pins.enable for pins in mcu.history[begin:])
 
 
+async def test_an_emergency_stop_holds_over_a_restart_until_the_operator_speaks(tmp_path: Path) -> None:
+    """A disarmed frame is the operator's leave to arm again: a process that has not heard him sends none."""
+    async with open_emulator() as mcu:
+        config = load_config(profile="hil", sets=(*sets_of(tmp_path), f"thrusters.line={mcu.thrust}"))
+        async with speaking(config) as bus:
+            async with thrusters(bus):
+                await bus.drive()
+                await mcu.set_pins("estop 1")
+                await bus.until_cause(m.ZeroCause.EMERGENCY_STOP)
+            await mcu.set_pins("estop 0")
+            bus.armed = None
+            async with thrusters(bus):
+                begin = bus.state.received
+                await until(lambda: bus.state.received > begin + 20, 15.0)
+                assert bus.state.value is not None
+                assert m.ThrustHold.EMERGENCY_STOP in bus.state.value.holds
+                bus.armed = False
+                await until(
+                    lambda: bus.state.value is not None and m.ThrustHold.EMERGENCY_STOP not in bus.state.value.holds
+                )
+
+
 async def test_a_restart_of_the_microcontroller_moves_nothing(tmp_path: Path) -> None:
     async with open_emulator() as mcu:
         config = load_config(profile="hil", sets=(*sets_of(tmp_path), f"thrusters.line={mcu.thrust}"))

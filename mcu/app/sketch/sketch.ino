@@ -76,18 +76,22 @@ paani::Device& device() {
     return device;
 }
 
-bool has_pulse(int index, uint32_t now_ms) {
-    return channels[index].width_us != 0 && now_ms - channels[index].seen_ms < RECEIVER_LOST_MS;
+// The width of a channel's newest pulse; 0 without one, or where it was too long ago or too long to be one.
+uint16_t pulse_us(int index) {
+    // An interrupt may measure another pulse at any moment: the clock is looked at last, so no age is negative.
+    const uint32_t width_us = channels[index].width_us, seen_ms = channels[index].seen_ms;
+    const bool is_lost = static_cast<uint32_t>(millis()) - seen_ms >= RECEIVER_LOST_MS;
+    return is_lost || width_us > UINT16_MAX ? 0 : static_cast<uint16_t>(width_us);
 }
 
-paani::Inputs read_inputs(uint32_t now_ms) {
+paani::Inputs read_inputs() {
     paani::Inputs inputs;
     inputs.estop = digitalRead(STOP_LOOP_PIN) == HIGH;
-    if (has_pulse(2, now_ms)) {
-        const bool takes_over = channels[2].width_us > TAKEOVER_US;
-        inputs.receiver = takes_over ? paani::Receiver::takes_over : paani::Receiver::standby;
+    const uint16_t switch_us = pulse_us(2);
+    if (switch_us != 0) {
+        inputs.receiver = switch_us > TAKEOVER_US ? paani::Receiver::takes_over : paani::Receiver::standby;
         for (int side = 0; side < 2; ++side) {
-            inputs.receiver_us[side] = has_pulse(side, now_ms) ? static_cast<uint16_t>(channels[side].width_us) : 0;
+            inputs.receiver_us[side] = pulse_us(side);
         }
     }
     inputs.battery_mv = static_cast<uint16_t>(analogRead(BATTERY_PIN) * BATTERY_FULL_MV / FULL_SCALE);
@@ -139,7 +143,7 @@ void setup() {
     matrix.begin();
     matrix.setGrayscaleBits(3);
     device().start(millis());
-    set_pins(device().step(read_inputs(millis()), pins, millis()));
+    set_pins(device().step(read_inputs(), pins, millis()));
     matrix.draw(device().matrix());
     watchdog::start();
     // Without a router this does not return; then the watchdog resets again and again, with the outputs safe throughout.
@@ -152,7 +156,7 @@ void setup() {
 
 void loop() {
     const uint32_t now_ms = millis();
-    const paani::Inputs inputs = read_inputs(now_ms);
+    const paani::Inputs inputs = read_inputs();
     set_pins(device().step(inputs, pins, now_ms));
     if (device().report(pins, now_ms)) {
         for (uint8_t line = 0; line < paani::LINES; ++line) {

@@ -66,8 +66,11 @@ class Estimator:
         """Messages refused since the process began, by cause."""
         self._reset()
 
-    def _reset(self) -> None:
-        """Forget all estimates: at start, and when the IMU restarts, because the boat may have been moved meanwhile."""
+    def _reset(self, *, has_moved: bool = False) -> None:
+        """Forget all estimates: at start, and when the IMU restarts, because the boat may have been moved meanwhile.
+
+        has_moved: what is known of the boat from before.
+        """
         self._calibration: list[ImuSample] = []
         self._local: PlanarFilter | None = None
         self._global: PlanarFilter | None = None
@@ -75,7 +78,7 @@ class Estimator:
         self._last_heading: ImuSample | None = None
         self._last_fix: GpsFix | None = None
         self._gyro_bias = estimate_gyro_bias(())
-        self._rest = RestDetector()
+        self._rest = RestDetector(has_moved=has_moved)
         self._accepted_fixes = 0
         self._refused_fixes = 0
         self._agreeing_refusals_m: list[tuple[float, float]] = []  # the latest refused fixes, as long as they agree
@@ -98,7 +101,7 @@ class Estimator:
         """
         samples, begins_anew = take_samples(samples, self._last_imu, now_us, self.drops)
         if begins_anew:
-            self._reset()
+            self._reset(has_moved=self._rest.has_moved)
         if samples:
             self._predict_motion(samples)
         usable = None if fix is None else check_fix(fix, self._last_fix, now_us, self.drops)

@@ -62,7 +62,12 @@ def find_inhibits(
     messages = (advisory, odometry, clock, arming, inputs.evidence)
     if any(message is not None and message.domain != domain for message in messages):
         found.append(Inhibit.WRONG_DOMAIN)
-    if arming is None or not arming.armed or arming.stopped or is_old(config.arming_max_age_s, inputs.arming_us):
+    if (
+        arming is None
+        or not arming.armed
+        or arming.stopped
+        or is_old(config.arming_max_age_s, inputs.arming_us, arming.source_us)
+    ):
         found.append(Inhibit.NOT_ARMED)
     if clock is None or is_old(config.clock_max_age_s, inputs.clock_us):
         found.append(Inhibit.NO_CLOCK)

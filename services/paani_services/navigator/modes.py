@@ -97,10 +97,12 @@ def _find_faults(
         return [Inhibit.NO_ORDER] if is_due else []
     if order.domain != domain:
         return [Inhibit.WRONG_DOMAIN]
-    is_old = is_out_of_date(inputs.order_us, config.order_max_age_s, now_us, config)
-    if order.mode is DriveMode.MANUAL and not _is_neutral(order):
-        stamps_us = inputs.order_us, order.source_us
-        is_old = is_old or any(is_out_of_date(each, config.stick_max_age_s, now_us, config) for each in stamps_us)
+    is_by_hand = order.mode is DriveMode.MANUAL
+    limit_s = min(config.order_max_age_s, config.stick_max_age_s) if is_by_hand else config.order_max_age_s
+    if is_by_hand and _is_neutral(order):  # no thrust, however long ago the stick came to rest
+        is_old = is_out_of_date(inputs.order_us, config.order_max_age_s, now_us, config)
+    else:
+        is_old = any(is_out_of_date(each, limit_s, now_us, config) for each in (inputs.order_us, order.source_us))
     # Neither the mission nor the fence that the order is for has come yet.
     is_for_other = order.mission_us not in {0, 0 if mission is None else mission.accepted_us}
     return [Inhibit.STALE_ORDER] * is_old + [Inhibit.NO_ROUTE] * is_for_other

@@ -60,6 +60,7 @@ from paani_services.navigator.guidance.visual_turns import (
     latch_heading,
 )
 from paani_services.navigator.interlocks import NavigatorInputs, find_inhibits
+from paani_services.navigator.mapping.observation import begins_anew
 from paani_services.navigator.mapping.observed_cells import Camera
 from paani_services.navigator.mapping.occupancy_grid import UNCALIBRATED_CAMERA
 from paani_services.navigator.way_round import course_round_rad
@@ -215,7 +216,8 @@ def begin_step(
             inputs.depth,
             now_us,
         )
-        state = msgspec.structs.replace(state, planner_state=planner_state)
+        station = None if begins_anew(planner_state.memory, state.planner_state.memory) else state.station
+        state = msgspec.structs.replace(state, planner_state=planner_state, station=station)
     return state, inhibits
 
 

@@ -138,8 +138,8 @@ def awaits_zero(operator: Operator) -> bool:
 
 
 def is_silent(held: Hold, now_us: int) -> bool:
-    """Whether the client has not said for too long that its button is held."""
-    return (now_us - held.refreshed_us) * 1e-6 > REFRESH_MAX_S
+    """Whether the client has not said for too long that its button is held, or the clock was set since."""
+    return not 0 <= now_us - held.refreshed_us <= REFRESH_MAX_S * 1e6
 
 
 def latch_text(operator: Operator) -> str:

@@ -20,6 +20,13 @@ RETRY_S = 0.5
 MAX_TEXT = 400  # of a message's text
 
 
+def operators_word(adapter: ThrustAdapter, decided: AppliedThrust) -> bool | None:
+    """Whether the operator has armed; None where his word has never come, or is too old to hold."""
+    if not adapter.has_heard_operator or decided.zero_cause is m.ZeroCause.ARMING_LOST:
+        return None
+    return adapter.is_armed
+
+
 class AutopilotOutput:
     """What stands behind the thrust adapter where an autopilot drives the motors."""
 
@@ -61,8 +68,8 @@ class AutopilotOutput:
 
     async def send(self, adapter: ThrustAdapter, decide: Callable[[], AppliedThrust]) -> None:
         """What is due now: the decision, unless something forbids it."""
-        is_armed = adapter.is_armed if adapter.has_heard_operator else None
-        orders = self._autopilot.advance(decide(), is_armed, stopwatch_ms())
+        decided = decide()
+        orders = self._autopilot.advance(decided, operators_word(adapter, decided), stopwatch_ms())
         self._tell()
         port = self._port
         if port is None:

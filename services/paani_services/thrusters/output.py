@@ -105,15 +105,14 @@ class OutputTracker:
 
     def applied(self, decided: AppliedThrust, output_cause: m.ZeroCause, now_ms: float) -> AppliedThrust:
         """What is applied now: the decision, unless the microcontroller withholds it or still runs the last one."""
-        if output_cause is not m.ZeroCause.NONE and output_cause is not m.ZeroCause.LINE_LOST:
+        if output_cause not in {m.ZeroCause.NONE, m.ZeroCause.LINE_LOST, m.ZeroCause.REFUSED}:
             return zero(decided, output_cause)
         last = self._accepted
         is_live = last is not None and now_ms - self._accepted_ms <= self._lease_ms
         if last is not None and is_live and last.zero_cause is m.ZeroCause.NONE:
             return last
-        if decided.zero_cause is m.ZeroCause.NONE:
-            return zero(decided, m.ZeroCause.LINE_LOST)  # not accepted yet
-        return decided
+        not_accepted = m.ZeroCause.LINE_LOST if output_cause is m.ZeroCause.NONE else output_cause
+        return zero(decided, not_accepted) if decided.zero_cause is m.ZeroCause.NONE else decided
 
 
 def zero(decided: AppliedThrust, cause: m.ZeroCause) -> AppliedThrust:

@@ -81,7 +81,9 @@ class Thrusters:
         """Pass on the operator's word; a change of it goes out at once."""
         while True:
             was_armed = self._adapter.is_armed
-            self._adapter.receive_arming(await self._arming.next(), self._monotonic.now_us())
+            arming = await self._arming.next()
+            age_us = max(0, self._clock.now_us() - arming.source_us)  # the operator may be on the other machine
+            self._adapter.receive_arming(arming, self._monotonic.now_us() - age_us)
             if self._adapter.is_armed is not was_armed:
                 self._due.set()
 

@@ -12,6 +12,7 @@ import msgspec
 from paani.config.planner import Angle, PlannerConfig
 from paani.config.section import Fraction, NonNegative, Positive, Section
 
+TotalTurn = Annotated[float, msgspec.Meta(gt=0.0, le=170.0)]  # degrees; half a turn could not be told from none
 Latitude = Annotated[float, msgspec.Meta(ge=-90.0, le=90.0)]
 Longitude = Annotated[float, msgspec.Meta(ge=-180.0, le=180.0)]
 
@@ -70,7 +71,7 @@ class NavigatorConfig(Section, frozen=True):
     slight_turn_deg: Positive = 10.0  # M6: the same for SLIGHT_LEFT and SLIGHT_RIGHT
     latch_turns: bool = True  # an advised turn is held until it is made; M5: no
     turn_hold_s: NonNegative = 1.5  # on a latched heading before the next turn is added
-    max_total_turn_deg: Positive = 90.0  # of one run of advised turns, so that a stuck detection cannot spin the boat
+    max_total_turn_deg: TotalTurn = 90.0  # of one run of advised turns, so that a stuck detection cannot spin the boat
     # Without the planner: way made past what was last seen beside the bow, before the boat turns back; 0: none.
     clear_m: NonNegative = 6.0
     advisory_max_age_s: Positive = 3.5  # M10: since the picture was taken

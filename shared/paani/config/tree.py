@@ -161,6 +161,7 @@ class Config(Section, frozen=True):
                 f"navigator.cruise_mps {self.navigator.cruise_mps} exceeds"
                 f" controller.max_speed_mps {self.controller.max_speed_mps}"
             )
+        self._require_foresight()
         policy = self.advisor.policy
         if policy.core_left >= policy.core_right:
             raise ValueError("advisor.policy.core_left must be left of advisor.policy.core_right")
@@ -175,6 +176,23 @@ class Config(Section, frozen=True):
             raise ValueError(
                 f"navigator.planner.turn_radius_m must be above 0: with controller.astern {self.controller.astern},"
                 f" less than controller.max_steer, no boat turns on the spot (profile=fans is for fans that only push)"
+            )
+
+    def _require_foresight(self) -> None:
+        """A planner that steps over obstacles, or looks no further than the boat stops, checks nothing."""
+        planner, speed_mps = self.navigator.planner, self.controller.max_speed_mps
+        if not planner.use:
+            return
+        if planner.step_s * speed_mps > planner.hull_radius_m:
+            raise ValueError(f"navigator.planner.step_s {planner.step_s} steps over what is as wide as the hull")
+        if planner.horizon_s < 2.0 * planner.step_s:
+            raise ValueError(f"navigator.planner.horizon_s {planner.horizon_s} is less than two steps (step_s)")
+        reach_m = planner.horizon_s * self.navigator.cruise_mps + planner.look_m
+        needed_m = max(planner.room_m, planner.stop_s * self.navigator.cruise_mps)
+        if reach_m < needed_m:
+            raise ValueError(
+                f"navigator.planner looks {reach_m:.2g} m ahead (horizon_s, look_m),"
+                f" less than the boat needs to stop or turn away: {needed_m:.2g} m (stop_s, room_m)"
             )
 
     def _require_graph(self) -> None:

@@ -77,6 +77,7 @@ def test_static_analysis_finds_nothing() -> None:
     command = ["cppcheck", "--quiet", "--std=c++17", "--language=c++", "--error-exitcode=1", "--inline-suppr"]
     command += ["--enable=warning,performance,portability", f"-I{CORE}"]
     command += ["--suppress=comparePointers"]  # the startup compares borders that the linker script names
+    command += ["--suppress=passedByValue:*sketch.ino"]  # the bridge's library makes what it hands in from these types
     folders = [CORE, ROOT / "mcu/qemu", ROOT / "mcu/native"]
     checked = subprocess.run([*command, *folders], capture_output=True, text=True, check=False)
     assert checked.returncode == 0, checked.stderr

@@ -233,6 +233,18 @@ def test_the_receiver_moves_nothing_until_its_sticks_were_at_rest(core: Core) ->
     assert is_moving(receiver_us=NEUTRAL)
 
 
+def test_a_boat_that_is_driven_by_hand_goes_on_when_linux_comes_back(core: Core) -> None:
+    """Whoever has the sticks decides, whatever Linux sends: its process was started anew, and sets the curves again."""
+    core.set_pins(receiver="takes over", receiver_us=NEUTRAL)
+    core.wait(3000)
+    core.set_pins(receiver="takes over", receiver_us=(1800, 1700))
+    boat = Boat(core)
+    for armed in (False, True, True):
+        boat.ask(armed=armed)
+        core.wait(10)
+        assert (boat.status.enabled, boat.pulses) == (True, (1800, 1700))
+
+
 @pytest.mark.parametrize(
     ("settings", "pins", "bit"),
     [

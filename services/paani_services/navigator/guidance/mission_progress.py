@@ -177,7 +177,8 @@ def _advance_leg(
     progress: MissionProgress, leg: MissionLeg, inputs: MissionInputs, config: NavigatorConfig
 ) -> tuple[MissionProgress, bool]:
     """One step of the leg that is due, and whether it has ended."""
-    is_armed_again = progress.was_stopped and inputs.arming is not None and inputs.arming.armed
+    arming = inputs.arming
+    is_armed_again = progress.was_stopped and arming is not None and arming.armed and not arming.stopped
     if leg.kind is LegKind.STOP:
         return progress, is_armed_again
     if leg.kind is LegKind.HOLD_STATION:

@@ -70,15 +70,20 @@ def fit_bottom(soundings: Sequence[tuple[float, float, float]]) -> Bottom | None
     east_m, north_m, depth_m = (math.fsum(axis) / count for axis in zip(*soundings, strict=True))
     rows = [(x_m - east_m, y_m - north_m, d_m - depth_m) for x_m, y_m, d_m in soundings]
     first = _solve(rows, STD_M + STD_FRAC * depth_m)
-    residual_m2 = math.fsum((d - first.down_east * x - first.down_north * y) ** 2 for x, y, d in rows) / (count - 3)
+    residual_m2 = math.fsum(_square(d - first.down_east * x - first.down_north * y) for x, y, d in rows) / (count - 3)
     fit = _solve(rows, max(STD_M + STD_FRAC * depth_m, math.sqrt(residual_m2)))
     return Bottom(east_m, north_m, depth_m, count, fit)
 
 
 def _solve(rows: Sequence[tuple[float, float, float]], std_m: float) -> Slopes:
     """The slopes of centred soundings that err by a standard deviation."""
-    prior = (std_m / PRIOR_SLOPE_STD) ** 2
+    prior = _square(std_m / PRIOR_SLOPE_STD)
     ee, nn = (math.fsum(row[k] * row[k] for row in rows) + prior for k in (0, 1))
     en, ed, nd = (math.fsum(row[i] * row[k] for row in rows) for i, k in ((0, 1), (0, 2), (1, 2)))
     det = ee * nn - en * en
     return Slopes((nn * ed - en * nd) / det, (ee * nd - en * ed) / det, std_m, ee, en, nn)
+
+
+def _square(value: float) -> float:
+    """As `value ** 2`, whose last bit is the machine's."""
+    return value * value

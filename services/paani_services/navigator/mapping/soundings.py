@@ -262,7 +262,7 @@ def _carry_over(
     memory: SoundingMemory, boat: ObservationMemory, here: StampedPose, odometry: Odometry | None
 ) -> SoundingMemory:
     """Where dead reckoning begins anew, places go on by the map, and the trend ends."""
-    if memory.reckoned_us and boat.poses[0].stamp_us > memory.reckoned_us:
+    if memory.reckoned_us and not boat.poses[0].stamp_us <= memory.reckoned_us <= here.stamp_us:
         east_m, north_m = memory.offset_m
         moved = []
         for cell in memory.cells:

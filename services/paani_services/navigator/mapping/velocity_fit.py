@@ -83,8 +83,10 @@ class VelocityEstimate(NamedTuple):
 
     @property
     def deviation_mps(self) -> float:
-        """Standard deviation along the axis on which that is larger."""
-        return math.sqrt(max(self.covariance[0], self.covariance[2]))
+        """Standard deviation in the direction in which that is largest."""
+        east_east, east_north, north_north = self.covariance
+        half_trace = 0.5 * (east_east + north_north)
+        return math.sqrt(half_trace + math.hypot(0.5 * (east_east - north_north), east_north))
 
     @property
     def squared_significance(self) -> float:

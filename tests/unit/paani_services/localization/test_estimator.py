@@ -173,3 +173,13 @@ def test_first_fix_is_the_origin_when_none_is_set() -> None:
     boat = EstimatedBoat(LocalizationConfig())
     boat.sail(4.0)
     assert math.hypot(boat.global_estimate.x_m, boat.global_estimate.y_m) < 1.5
+
+
+def test_a_boat_that_has_moved_is_not_moored_because_its_imu_began_anew(boat: EstimatedBoat) -> None:
+    """Adrift, too slowly for the receiver to tell: only that it never moved says that a boat lies still."""
+    boat.sail(4.0, surge_mps=0.6)
+    boat.sail(25.0, surge_mps=0.03)
+    boat.epoch += 1
+    boat.sail(30.0, surge_mps=0.03)
+    assert boat.global_estimate.healthy
+    assert math.hypot(boat.global_estimate.surge_mps, boat.global_estimate.sway_mps) > 0.0

@@ -275,6 +275,7 @@ def test_route_without_repeat_ends() -> None:
         ({"arming": Arming(source_us=1, armed=False)}, Inhibit.NOT_ARMED),
         ({"arming": Arming(source_us=1, armed=True, stopped=True)}, Inhibit.NOT_ARMED),
         ({"arming_us": NOW_US - 1_000_001}, Inhibit.NOT_ARMED),
+        ({"arming": Arming(source_us=NOW_US - 1_000_001, armed=True)}, Inhibit.NOT_ARMED),
         ({"clock": None}, Inhibit.NO_CLOCK),
         ({"clock_us": NOW_US - 400_001}, Inhibit.NO_CLOCK),
         ({"clock": SimTime(source_us=1, sim_us=NOW_US, stamp_us=1, running=False)}, Inhibit.CLOCK_STOPPED),

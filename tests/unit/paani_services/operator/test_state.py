@@ -62,6 +62,7 @@ def test_a_client_that_was_silent_has_let_go() -> None:
     assert not op.is_silent(op.Hold(STATION, 7, 0, BEGUN_US), BEGUN_US + round(op.REFRESH_MAX_S * 1e6))
     late_us = BEGUN_US + round((op.REFRESH_MAX_S + 1.2) * 1e6)
     state = held(op.initial_state(op.CLEAR), 1.2)
+    assert op.judge_release(state, STATION, 7, BEGUN_US + 300_000) is m.ArmRefusal.BROKEN, "the clock was set back"
     assert op.judge_release(state, STATION, 7, late_us) is m.ArmRefusal.BROKEN
     state = op.hold(state, STATION, 7, late_us)
     assert (state.hold, state.ended.refusal) == (None, m.ArmRefusal.BROKEN)

@@ -10,8 +10,10 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from paani import messages as m
-from paani.thrust_adapter import AppliedThrust
+from paani.config import AdapterConfig
+from paani.thrust_adapter import AppliedThrust, ThrustAdapter
 from paani_services.thrusters.autopilot import MANUAL
+from paani_services.thrusters.autopilot_output import operators_word
 from paani_services.thrusters.autopilot_parameters import required_parameters
 from paani_services.thrusters.autopilot_sticks import Sticks
 from tests.rover_by_the_book import AHEAD, MIXER, PERIOD_MS, STICKS, STILL, RoverByTheBook
@@ -160,6 +162,22 @@ def test_what_ends_a_drive_is_told_and_stays_ended(
     assert not set(rover.sticks) - {STILL}
     rover.run(is_armed=False)
     rover.drive()
+
+
+def test_an_operators_word_that_is_too_old_is_no_word_and_ends_a_drive(rover: RoverByTheBook) -> None:
+    config = AdapterConfig(require_pulses=())
+    adapter = ThrustAdapter(config, domain=43)
+    assert operators_word(adapter, adapter.decide(0)) is None
+    adapter.receive_arming(m.Arming(source_us=0, armed=True), 0)
+    lost_us = round(config.arming_timeout_s * 1e6) + 1
+    assert operators_word(adapter, adapter.decide(lost_us - 1)) is True
+    decided = adapter.decide(lost_us)
+    assert operators_word(adapter, decided) is None
+    rover.drive()
+    rover.run(is_armed=operators_word(adapter, decided), decided=decided)
+    assert "the operator's word is not known" in rover.problem
+    rover.run(is_armed=True, seconds=4.0)
+    assert not set(rover.sticks) - {STILL}
 
 
 def test_nothing_is_sent_to_whoever_changed_the_mode(rover: RoverByTheBook) -> None:

@@ -88,6 +88,8 @@ def test_a_zero_is_applied_when_it_was_answered_or_the_lease_is_over() -> None:
     output.accept(AHEAD, 1000.0)
     assert output.applied(DISARMED, m.ZeroCause.NONE, 1100.0) == AHEAD
     assert output.applied(DISARMED, m.ZeroCause.LINE_LOST, 1000.0 + LEASE_MS) == AHEAD
+    assert output.applied(DISARMED, m.ZeroCause.REFUSED, 1000.0 + LEASE_MS) == AHEAD, "refused: the last one runs on"
+    assert output.applied(AHEAD, m.ZeroCause.REFUSED, 1001.0 + LEASE_MS).zero_cause is m.ZeroCause.REFUSED
     assert output.applied(DISARMED, m.ZeroCause.LINE_LOST, 1001.0 + LEASE_MS) == DISARMED
     assert output.applied(AHEAD, m.ZeroCause.LINE_LOST, 1001.0 + LEASE_MS).zero_cause is m.ZeroCause.LINE_LOST
     output.accept(DISARMED, 1100.0)

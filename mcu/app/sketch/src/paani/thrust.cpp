@@ -19,9 +19,13 @@ void Thrust::start(uint32_t now_ms) {
 }
 
 void Thrust::disarm() {
+    release();
+    is_receiver_blocked_ = true;
+}
+
+void Thrust::release() {
     is_armed_ = false;
     may_arm_ = false;
-    is_receiver_blocked_ = true;
     applied_[0] = applied_[1] = 0;
 }
 
@@ -58,7 +62,7 @@ Verdict Thrust::receive(const uint8_t* payload, uint32_t now_ms) {
     }
     // A lost link and another process do not go on where the boat was stopped.
     if (lease_.state() == State::safe || lease_.state() == State::boot || claim.session != lease_.session()) {
-        disarm();
+        release();
     }
     lease_.accept(claim, now_ms);
     if (payload[1] == 0) {
@@ -84,7 +88,7 @@ Verdict Thrust::configure(const uint8_t* payload, uint32_t now_ms) {
     counters_.count(verdict);
     if (verdict == Verdict::accepted) {
         esc_ = settings;
-        disarm();
+        release();
     }
     return verdict;
 }

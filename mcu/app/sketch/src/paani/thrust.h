@@ -56,6 +56,7 @@ class Thrust {
     };
 
     Verdict judge(const uint8_t* payload, Claim& claim, uint32_t now_ms);
+    void release();  // Linux's hand is off; who drives by the receiver goes on
     void update_holds(const Inputs& inputs, uint32_t now_ms);
     void update_receiver_block(const Inputs& inputs);
     int32_t slew(int32_t applied, int32_t target, int32_t step) const;

@@ -121,6 +121,8 @@ def test_a_stop_leg_ends_when_the_boat_is_stopped_and_armed_again() -> None:
     assert ship.settle(60.0).inhibits == (Inhibit.HOLDING,)
     ship.armed, ship.stopped = False, True
     assert Inhibit.NOT_ARMED in ship.settle(1.0).inhibits
+    ship.armed, ship.stopped = True, True
+    assert ship.settle(1.0).leg_index == 0, "stopped all the same"
     ship.armed, ship.stopped = True, False
     order = ship.settle(0.1)
     assert (order.leg_index, order.enable) == (1, True)

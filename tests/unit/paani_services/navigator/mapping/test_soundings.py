@@ -256,13 +256,16 @@ def test_an_echo_lost_over_water_that_became_shallow_is_lost_in_the_blind_zone()
     assert deep.memory.cells == ()
 
 
-def test_shallow_places_go_on_by_the_map_where_dead_reckoning_begins_anew() -> None:
+@pytest.mark.parametrize("set_back_s", [0, 5, 3600])
+def test_shallow_places_go_on_by_the_map_where_dead_reckoning_begins_anew(set_back_s: int) -> None:
     survey = Survey()
+    survey.now_us += 7200 * 10**6
     survey.sail(10, level(0.4))
     survey.map_off_m = 3.0
     survey.sail(10, level(0.4))
     before = survey.places()
     survey.epoch += 1
+    survey.now_us -= set_back_s * 10**6
     survey.sail(1, level(2.0))
     assert len(before) == len(survey.places()) > 2
     for (old_m, _), (new_m, _) in zip(before, survey.places(), strict=True):
