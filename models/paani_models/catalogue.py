@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from pathlib import Path
 from typing import Literal
 
@@ -146,7 +147,22 @@ def read_contract(file: Path, role: str) -> Model:
     shape, wanted = declared.input.shape, "[1, H, W, 3]" if declared.input.dtype == "uint8" else "[1, 3, H, W]"
     if len(shape) != 4 or (shape[0], shape[3 if declared.input.dtype == "uint8" else 1]) != (1, 3):
         raise UserError(f"{manifest}: {file.name}: input.shape: {list(shape)} is not {wanted}")
+    _require_fitting_output(declared, role, f"{manifest}: {file.name}")
     return declared
+
+
+def _require_fitting_output(declared: Model, role: str, where: str) -> None:
+    """Raises UserError naming the field by which the picture would be spoilt, or the output not read."""
+    preprocessing, shape = declared.preprocessing, declared.output.shape
+    if not 0 <= preprocessing.pad_grey <= 255:
+        raise UserError(f"{where}: preprocessing.pad_grey: {preprocessing.pad_grey} is not in 0..255")
+    if not all(0.0 < each < math.inf for each in preprocessing.std):
+        raise UserError(f"{where}: preprocessing.std: {list(preprocessing.std)} is not above 0")
+    rows = 4 + len(declared.classes) if role == "detector" else len(declared.classes)
+    if role == "detector" and (len(shape) != 3 or shape[:2] != (1, rows)):
+        raise UserError(f"{where}: output.shape: {list(shape)} is not [1, {rows}, N], four numbers and the classes")
+    if role == "segmenter" and (len(shape) != 4 or shape[:2] != (1, rows) or min(shape) < 1):
+        raise UserError(f"{where}: output.shape: {list(shape)} is not [1, {rows}, H, W]")
 
 
 def choose_model(role: str, path: str) -> tuple[Model, Path]:

@@ -30,7 +30,7 @@ from paani_services.advisor.people import (
     speed_limit_mps,
 )
 from paani_services.advisor.policy import Decision, advised_purpose, decide, frame_components
-from paani_services.advisor.risk import ALL_EVIDENCE, LANES, lane_water, obstacles_from_tracks
+from paani_services.advisor.risk import ALL_EVIDENCE, LANES, Obstacle, lane_water, obstacles_from_tracks, people_aside
 from paani_services.advisor.tracker import (
     TrackerState,
     is_valid_box,
@@ -117,8 +117,9 @@ def _process_frame(state: AdvisorState, evidence: Evidence, config: Config) -> A
         facts = frame_facts(state.policy, water, obstacles, config)
         policy, decision = decide(state.policy, facts, frame_components(facts, ALL_EVIDENCE, config), config)
         decision = msgspec.structs.replace(decision, counterfactual=find_counterfactual(facts, decision, config))
-        decision = _add_people(decision, facts, config)
-        station_until_us = evidence.source_us + round(nobody_near_s(facts.obstacles, config) * 1e6)
+        aside = people_aside(tracker, evidence.width_px / max(1, evidence.height_px), config)
+        decision = _add_people(decision, facts, aside, config)
+        station_until_us = evidence.source_us + round(nobody_near_s((*facts.obstacles, *aside), config) * 1e6)
     else:
         policy = msgspec.structs.replace(policy, clear_frames=0)  # an unusable frame interrupts a run of clear ones
         decision = _stop_for(NO_DECISION, Reason.MALFORMED_EVIDENCE if evidence.usable else Reason.UNUSABLE_IMAGE)
@@ -138,19 +139,23 @@ def _remembers_station(state: AdvisorState, evidence: Evidence, tracker: Tracker
     return may_keep_station_unseen(evidence.cause, state.station_until_us, evidence.source_us, candidates, config)
 
 
-def _add_people(decision: Decision, facts: FrameFacts, config: Config) -> Decision:
-    """The decision with who is ahead and how fast the boat may go; the same decision where nobody is near."""
+def _add_people(decision: Decision, facts: FrameFacts, aside: tuple[Obstacle, ...], config: Config) -> Decision:
+    """The decision with who is ahead and how fast the boat may go; the same decision where nobody is near.
+
+    aside: people whom the boat has turned away from.
+    """
     limit_mps, ahead = speed_limit_mps(facts.obstacles, config), facts.lanes["center"].people
     people = [facts.obstacles[i] for i in ahead if facts.obstacles[i].candidate is None]
     candidates = tuple(n for i in ahead if (n := facts.obstacles[i].candidate) is not None)
-    distance_m = nearest_ahead_m(facts.obstacles, ahead)
+    named = ahead if not people else [i for i in ahead if facts.obstacles[i].candidate is None]
+    distance_m = nearest_ahead_m(facts.obstacles, named)
     return msgspec.structs.replace(
         decision,
         speed_limit_mps=msgspec.UNSET if limit_mps is None else limit_mps,
         people_ahead=tuple(person.id for person in people) if config.advisor.people.use else msgspec.UNSET,
         candidates_ahead=candidates or msgspec.UNSET,
         person_distance_m=msgspec.UNSET if distance_m is None else distance_m,
-        may_keep_station=may_keep_station(decision.reason, facts.obstacles, config) or msgspec.UNSET,
+        may_keep_station=may_keep_station(decision.reason, (*facts.obstacles, *aside), config) or msgspec.UNSET,
     )
 
 
@@ -158,9 +163,10 @@ def is_well_formed(evidence: Evidence) -> bool:
     """Whether every fraction lies in [0, 1] and every box has an area. NaN fails each comparison."""
     lanes = (evidence.left, evidence.center, evidence.right)
     boxed: tuple[Detection | Candidate, ...] = (*evidence.detections, *(evidence.candidates or ()))
-    return all(
-        0.0 <= value <= 1.0 for lane in lanes for value in (lane.non_water, lane.uncertainty, lane.clear_width)
-    ) and all(map(is_valid_box, boxed))
+    fractions = [value for lane in lanes for value in (lane.non_water, lane.uncertainty, lane.clear_width)]
+    fractions += [lane.open_width for lane in lanes if not isinstance(lane.open_width, msgspec.UnsetType)]
+    fractions += evidence.water_edge
+    return all(0.0 <= value <= 1.0 for value in fractions) and all(map(is_valid_box, boxed))
 
 
 def _decision_at(state: AdvisorState, now_us: int, config: Config) -> Decision:

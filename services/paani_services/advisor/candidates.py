@@ -12,7 +12,7 @@ from paani import portable
 from paani.boxes import covered_frac
 from paani.config import CalibrationConfig, Config
 from paani.messages import BoxXyxy, Candidate, Evidence
-from paani_services.advisor.risk import LANES, Obstacle, foot_range_m
+from paani_services.advisor.risk import LANES, Obstacle, nearest_range_m
 from paani_services.advisor.tracker import TrackerState, is_confirmed
 
 EXPLAINED_FRAC = 0.5  # of a candidate, inside the box of what it then is
@@ -33,7 +33,7 @@ def candidate_obstacles(evidence: Evidence, tracks: TrackerState, config: Config
         box = candidate.box_xyxy
         if box[3] <= config.perception.corridors.top:
             continue
-        distance_m = foot_range_m(box, aspect, config.calibration)
+        distance_m = nearest_range_m(box, aspect, config.calibration)
         if any(covered_frac(box, other) >= EXPLAINED_FRAC for other in recognised):
             continue
         if distance_m is not None and width_m(box, distance_m, config.calibration) > people.widest_m:

@@ -47,6 +47,7 @@ UNUSABLE_TEXT = {
     UnusableCause.NO_HORIZON: "shows water to its upper edge, as no boat sees it",
     UnusableCause.STALE: "was too old to look at",
 }
+NO_OPEN_WATER = "the way ahead shows no open water"
 CANDIDATE_TEXT = "something that may be a person"
 MAX_NAMED_TRACKS = 3  # further tracks are counted, not named
 ALTERNATIVE_TEXT = {
@@ -86,12 +87,14 @@ def _people_text(advisory: Advisory) -> str:
     else:
         return ""
     if not isinstance(advisory.person_distance_m, msgspec.UnsetType):
-        who += f" at about {advisory.person_distance_m:.0f} m"
+        who += f" at about {advisory.person_distance_m:.0f} m" if advisory.person_distance_m > 0.0 else " close by"
     if advisory.direction is Direction.STOP:
         return f"Stop: {who}, waiting. "
+    is_slowed = not isinstance(advisory.speed_limit_mps, msgspec.UnsetType)
+    said = f"Slow: {who}" if is_slowed else f"{who[0].upper()}{who[1:]}"
     if advisory.purpose is Purpose.LOOK:
-        return f"Slow: {who}, looking for a way around. "
-    return f"Slow: {who}, passing on the {SIDE_OF.get(advisory.direction, 'side')}. "
+        return f"{said}, looking for a way around. "
+    return f"{said}, passing on the {SIDE_OF.get(advisory.direction, 'side')}. "
 
 
 def _counterfactual_text(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
@@ -141,6 +144,9 @@ def _reason_text(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
     if someone and center.risk < center.limit:
         who = "somebody is" if advisory.people_ahead else f"{CANDIDATE_TEXT} is"
         centre = f"{who} in the way ahead or beside it"
+    elif center.blocked and center.risk < center.limit:
+        closed = f"the way ahead is not free, with {names} in it" if names else NO_OPEN_WATER
+        centre = f"the way ahead is occupied{by}" if center.occupied else closed
     limits = [_limit(side, advisory.side_block_risk) for side in (left, right)]
     side_texts = [f"left {left.risk:.2f}", f"right {right.risk:.2f}"]
     if limits[0] != limits[1]:
@@ -168,8 +174,8 @@ def _reason_text(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
             return f"keeping the turn until the way ahead stays clear, {centre}"
         case Reason.CENTER_OCCUPIED if someone and not center.occupied:
             return f"{centre}; {sides}"
-        case Reason.CENTER_OCCUPIED if not names and not center.occupied:
-            return f"the way ahead shows no open water; {sides}"
+        case Reason.CENTER_OCCUPIED if not center.occupied:
+            return f"{NO_OPEN_WATER}; {sides}"
         case Reason.CENTER_OCCUPIED:
             return f"the way ahead is occupied{by}; {sides}"
         case Reason.CENTER_VESSEL:

@@ -19,6 +19,7 @@ from paani_services.advisor.tracker import (
     is_accepted,
     is_confirmed,
     is_immediate_danger,
+    is_person,
     presence,
 )
 
@@ -181,6 +182,29 @@ def corridor_risk(non_water: Value, obstacle: Value, urgency: Value, uncertainty
     return np.minimum(1.0, risk) if isinstance(risk, np.ndarray) else min(1.0, risk)
 
 
+def nearest_range_m(box: BoxXyxy, aspect: float, calibration: CalibrationConfig) -> float | None:
+    """As `foot_range_m`; 0 where the box goes on beyond the picture's lower edge: its foot may be anywhere nearer."""
+    return 0.0 if calibration.valid and box[3] >= 1.0 - SIDE_MARGIN else foot_range_m(box, aspect, calibration)
+
+
+def people_aside(state: TrackerState, aspect: float, config: Config) -> tuple[Obstacle, ...]:
+    """People whom the boat has turned away from, as near as they can have come by swimming since they were seen."""
+    settings, people = config.advisor.tracker, config.advisor.people
+    found = []
+    for track in state.tracks:
+        if people.use and track.is_out_of_view and is_person(track, state.at_us, settings):
+            box = track.seen_box or track.box
+            range_m = nearest_range_m(box, aspect, config.calibration)
+            swum_m = people.swim_mps * (state.at_us - track.seen_us) * 1e-6
+            found.append(
+                Obstacle(
+                    id=track.id, is_vessel=False, box=box, severity=0.0, urgency=0.0, presence=1.0, is_danger=False,
+                    is_person=True, distance_m=None if range_m is None else max(range_m - swum_m, 0.0),
+                )
+            )  # fmt: skip
+    return tuple(found)
+
+
 def obstacles_from_tracks(
     state: TrackerState,
     config: Config,
@@ -223,14 +247,14 @@ def obstacles_from_tracks(
             presence=presence(track, state.at_us, settings),
             is_danger=is_immediate_danger(track.box, settings),
             exempt_lanes=exempt_lanes(track),
-            is_person=track.label == "person",
+            is_person=is_person(track, state.at_us, settings),
             is_confirmed=is_confirmed(track, settings),
-            distance_m=foot_range_m(track.box, aspect, config.calibration),
+            distance_m=nearest_range_m(track.box, aspect, config.calibration),
             is_ashore=sees_people and (is_turn_known or not track.held) and stands_ashore(track.box, water_edge),
         )
         for track in state.in_view
         if track.box[3] > config.perception.corridors.top
-        and (is_accepted(track, settings) or (sees_people and track.label == "person"))
+        and (is_accepted(track, settings) or (sees_people and is_person(track, state.at_us, settings)))
     )
 
 

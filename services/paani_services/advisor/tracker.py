@@ -61,12 +61,16 @@ MAX_AGE_S = 1e9  # bound of the message field
 
 
 class Identity(msgspec.Struct, frozen=True):
-    """The identity of a track: its number, when it began, its sightings, and the history of its size."""
+    """The identity of a track: its number, when it began, its sightings, and the history of its size.
+
+    person_us: when it was last seen to be a person; 0: never.
+    """
 
     id: int
     born_us: int
     hits: int = 0
     motion: MotionHistory = MotionHistory()
+    person_us: int = 0
 
 
 class TrackMemory(msgspec.Struct, frozen=True, rename={"attitude": "seen_from", "is_out_of_view": "left"}):
@@ -233,6 +237,12 @@ def is_accepted(track: TrackMemory, config: TrackerConfig) -> bool:
     return is_confirmed(track, config) or is_immediate_danger(track.box, config)
 
 
+def is_person(track: TrackMemory, at_us: int, config: TrackerConfig) -> bool:
+    """Whether somebody is there: seen to be a person, and called nothing else for as long as a track is held."""
+    person_us = track.identity.person_us
+    return track.label is Label.PERSON or (person_us > 0 and (at_us - person_us) * 1e-6 < config.hold_s)
+
+
 def is_confirmed(track: TrackMemory, config: TrackerConfig) -> bool:
     """Whether the track was seen often enough, at its place or by its identity (G4)."""
     return max(track.hits, track.identity.hits) >= config.confirm_hits
@@ -293,6 +303,7 @@ def _update_identity(before: Identity, detection: Detection, frame: _Frame, *, i
         born_us=min(before.born_us, frame.at_us),
         hits=before.hits + 1,
         motion=add_measurement(before.motion, measurement, frame.window, frame.config.motion),
+        person_us=frame.at_us if detection.label is Label.PERSON else before.person_us,
     )
 
 

@@ -1,7 +1,7 @@
 """Segmenter output to a class mask, three corridors of water and the water's edge (E1-E7). Pure.
 
-A cell of the mask is 4x4 pixels of the segmenter's output. A segmenter that ends with a fourfold resize gives the
-cells' scores before it; of any other output, the pixel right of and below the cell's middle is taken.
+A mask has 64 x 80 cells, each 4 x 4 pixels of the shipped segmenter's output. A segmenter that ends with a fourfold
+resize gives the cells' scores before it; else the pixel right of and below the cell's middle is taken.
 """
 
 from typing import NamedTuple
@@ -16,7 +16,7 @@ from paani.config import CorridorConfig
 from paani.messages import LaneEvidence
 
 CELL_PX, CELL_MIDDLE_PX = 4, 2  # side of a cell, and the pixel of it that is taken
-MIN_CELL_ROWS = 32  # output with fewer rows than this many cells have consists of cells already
+MASK_HW = (64, 80)  # cells of a mask
 MIN_VISIBLE_FRAC = 0.5  # a corridor of which less is visible is unknown, and so blocked
 BOW_ROWS_FRAC = 0.2  # of the picture, from its lower edge: where water begins that the boat floats in
 WATER, OBSTACLE, SKY = 0, 1, 2  # D6
@@ -38,19 +38,23 @@ def cell_shape(shape: tuple[int, ...]) -> tuple[int, ...] | None:
     if len(shape) != 4:
         return None
     cells = (*shape[:2], shape[2] // CELL_PX, shape[3] // CELL_PX)
-    return cells if cells[2] < CELL_PX * MIN_CELL_ROWS <= shape[2] else None
+    return cells if cells[2:] == MASK_HW else None
 
 
 def classify_cells(logits: F32, temperature: float) -> tuple[U8, F32]:
-    """Class mask uint8 and confidence float32 [h, w]: argmax and largest softmax probability of each cell (E1).
+    """Class mask uint8 and confidence float32 [64, 80]: argmax and largest softmax probability of each cell (E1).
 
-    logits: float32 [1, 3, H, W] of water, obstacle, sky; with fewer than `CELL_PX * MIN_CELL_ROWS` rows, of cells.
+    logits: float32 [1, 3, H, W] of water, obstacle, sky: of the cells, of four pixels to each side of one, or of any
+    other size, which is scaled to the cells.
     """
-    cells = (
-        logits[0, :, CELL_MIDDLE_PX::CELL_PX, CELL_MIDDLE_PX::CELL_PX]
-        if logits.shape[2] >= CELL_PX * MIN_CELL_ROWS
-        else logits[0]
-    )
+    size_hw = logits.shape[2:]
+    if size_hw == (CELL_PX * MASK_HW[0], CELL_PX * MASK_HW[1]):
+        cells = logits[0, :, CELL_MIDDLE_PX::CELL_PX, CELL_MIDDLE_PX::CELL_PX]
+    elif size_hw == MASK_HW:
+        cells = logits[0]
+    else:
+        scores_of = np.ascontiguousarray(logits[0].transpose(1, 2, 0))
+        cells = cv2.resize(scores_of, MASK_HW[::-1], interpolation=cv2.INTER_LINEAR).transpose(2, 0, 1)
     scores = cells / np.float32(temperature)
     largest = scores.max(axis=0)
     confidence = 1.0 / np.exp(scores - largest).sum(axis=0)

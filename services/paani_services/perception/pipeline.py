@@ -39,11 +39,15 @@ SEGMENTER_CLASSES = ("water", "obstacle", "sky")  # D6
 
 
 class Found(NamedTuple):
-    """Detections, boxes that may be people by a lower threshold, and the time both took [ms]."""
+    """Detections, boxes that may be people by a lower threshold, and the time both took [ms].
+
+    is_finite: whether any candidate of the network is made of numbers; where none is, nothing was looked for.
+    """
 
     detections: tuple[Detection, ...]
     people: tuple[Detection, ...]
     duration_ms: float
+    is_finite: bool = True
 
 
 class Segmentation(NamedTuple):
@@ -127,6 +131,8 @@ class Perceiver:
         else:
             found = self._detect(bgr)
             segmentation = segmenting.result() if segmenting else self._segment(bgr, roll_rad)  # B4: in turn
+        if not found.is_finite:
+            segmentation = segmentation._replace(source=SegmentationSource.FALLBACK)  # nobody moves by half the eyes
         found = self._without_reflections(found, segmentation)
         cause = self._judge_view(cause, found, segmentation, header.frame_epoch)
         timing = msgspec.structs.replace(
@@ -211,7 +217,8 @@ class Perceiver:
             visible_frac = self._visible_fractions_of((64, 80))
             detections = tuple(d for d in detections if not is_own_hull(d.box_xyxy, visible_frac))
             people = tuple(d for d in people if not is_own_hull(d.box_xyxy, visible_frac))
-        return Found(detections, people, self._stopwatch_ms() - start_ms)
+        is_finite = bool(np.isfinite(output[0]).all(axis=0).any())
+        return Found(detections, people, self._stopwatch_ms() - start_ms, is_finite)
 
     def _without_reflections(self, found: Found, segmentation: Segmentation) -> Found:
         """What was found without people who are water by the mask, where the full set's networks say both."""

@@ -173,7 +173,7 @@ class Bus:
 
     def note(self, text: str) -> None:
         """One short line for the health report."""
-        self.note_text = text[:200]
+        self.note_text = text[:200].encode(errors="replace").decode()  # a file's name may be no text
 
     async def close(self) -> None:
         await asyncio.to_thread(self._session.close)

@@ -18,7 +18,16 @@ from paani.cli import main
 from paani.clock import stopwatch_ms
 from paani.config import PerceptionConfig, load_config
 from paani.errors import UserError
-from paani_models.catalogue import Model, Preprocessing, Tensor, load_catalogue, save_catalogue, verified_path
+from paani_models.catalogue import (
+    Model,
+    Preprocessing,
+    Tensor,
+    load_catalogue,
+    read_contract,
+    save_catalogue,
+    verified_path,
+)
+from paani_services.perception.corridors import classify_cells
 from paani_services.perception.engine import OnnxEngine
 from paani_services.perception.pipeline import Perceiver
 from paani_services.perception.service import require_people_seen
@@ -112,6 +121,9 @@ def test_without_a_manifest_the_shipped_contract_holds(tmp_path: Path, capsys: p
         ({"classes": ("water", "water", "sky")}, "classes: a segmenter has water, obstacle, sky, each once"),
         ({"input": Tensor("input", (3, 96, 160))}, r"input\.shape"),
         ({"preprocessing": Preprocessing("letterbox", (0.0,) * 3, (1.0,) * 3)}, r"preprocessing\.resize"),
+        ({"preprocessing": Preprocessing("stretch", (0.0,) * 3, (0.0, 1.0, 1.0))}, r"preprocessing\.std: \[0\.0, 1\.0"),
+        ({"preprocessing": Preprocessing("stretch", (0.0,) * 3, (1.0,) * 3, 400)}, r"preprocessing\.pad_grey: 400"),
+        ({"output": Tensor("output", (1, 2, 96, 160))}, r"output\.shape: \[1, 2, 96, 160\] is not \[1, 3, H, W\]"),
     ],
 )
 def test_a_manifest_that_cannot_be(foreign: Path, changes: dict[str, Any], named: str) -> None:
@@ -119,6 +131,34 @@ def test_a_manifest_that_cannot_be(foreign: Path, changes: dict[str, Any], named
     save_catalogue({"lake": own}, foreign.parent)
     with pytest.raises(UserError, match=named):
         OnnxEngine.load("segmenter", str(foreign), 1)
+
+
+@pytest.mark.parametrize("size", [(16, 20), (128, 2), (64, 80), (300, 500)])
+def test_a_mask_has_the_same_cells_whatever_the_size_of_the_output(size: tuple[int, int]) -> None:
+    logits = np.zeros((1, 3, *size), np.float32)
+    logits[0, 1, : size[0] // 2] = 9.0
+    mask, confidence = classify_cells(logits, 1.0)
+    assert mask.shape == confidence.shape == (64, 80)
+    assert (mask[:28] == 1).all()
+    assert (mask[36:] == 0).all()
+
+
+def test_a_detectors_manifest_states_a_row_for_each_class(tmp_path: Path) -> None:
+    own = msgspec.structs.replace(load_catalogue()["detector"], file="own.onnx", classes=("vessel", "person"))
+    save_catalogue({"own": own}, tmp_path)
+    with pytest.raises(UserError, match=r"output\.shape: \[1, 8, 2730\] is not \[1, 6, N\]"):
+        read_contract(tmp_path / "own.onnx", "detector")
+
+
+def test_a_detector_that_answers_with_no_number_moves_nothing(tmp_path: Path) -> None:
+    """No box is not nobody: where none of its candidates is finite, nothing was looked for."""
+    path = tmp_path / "own.onnx"
+    for answer, is_eligible in ((np.nan, False), (0.0, True)):
+        output = candidates(200.0, 0.0)
+        output[:, 4:] = answer
+        save(path, output, [1, 3, 320, 416])
+        evidence, _ = Perceiver(PerceptionConfig(detector=str(path)), stopwatch_ms).perceive(river(), HEADER, 0.0)
+        assert (evidence.usable, evidence.navigation_eligible) == (True, is_eligible)
 
 
 def probabilities() -> np.ndarray:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import msgspec
 import pytest
 
 from paani import messages as m
 from paani_services.advisor.explanation import explain_advisory
-from tests.unit.paani_services.advisor.advisor_evidence import CLEAR, box, play, seeing
+from tests.unit.paani_services.advisor.advisor_evidence import CALIBRATED, CLEAR, box, play, seeing
 
 SWIMMER = box(m.Label.PERSON, (0.20, 0.35, 0.80, 0.64))
 
@@ -50,3 +52,33 @@ def test_a_side_says_what_closes_it_unless_its_risk_does(side: m.LaneRisk, says:
 def test_a_picture_of_too_few_pixels_is_called_too_small() -> None:
     frame = msgspec.structs.replace(CLEAR, usable=False, cause=m.UnusableCause.WRONG_SIZE)
     assert words(frame).startswith("Stop: the picture is too small.")
+
+
+@pytest.mark.parametrize(
+    ("risk", "fields", "says"),
+    [
+        (0.26, {}, "Stop: the way ahead shows no open water and no side is free"),
+        (0.26, {"track_ids": (1,)}, "the way ahead is not free, with buoy #1 in it and no side is free"),
+        (0.26, {"track_ids": (1,), "occupied": True}, "the way ahead is occupied by buoy #1 and no side is free"),
+        (0.50, {}, "Stop: centre risk 0.50 (limit 0.48) and no side is free"),
+    ],
+)
+def test_a_centre_says_what_closes_it_and_no_risk_that_does_not(risk: float, fields: dict[str, Any], says: str) -> None:
+    center = m.LaneRisk(risk=risk, blocked=True, limit=0.48, **fields)
+    _, advice, tracks = play([seeing(box(m.Label.BUOY, (0.45, 0.4, 0.55, 0.5)))] * 3)
+    advisory = msgspec.structs.replace(
+        advice[-1], center=center, direction=m.Direction.STOP, reason=m.Reason.NO_SAFE_SIDE
+    )
+    assert says in explain_advisory(advisory, tracks[-1].tracks)
+
+
+@pytest.mark.parametrize(("foot", "says"), [(0.60, "Slow: swimmer ahead at about"), (0.485, "Swimmer ahead at about")])
+def test_the_boat_is_said_to_slow_where_it_has_to(foot: float, says: str) -> None:
+    """And the distance is that of whom the sentence names, however near somebody else may be."""
+    frame = seeing(box(m.Label.PERSON, (0.47, foot - 0.1, 0.53, foot), 0.9))
+    advisory = play([frame] * 3, CALIBRATED)[1][-1]
+    assert advisory.explanation.startswith(says)
+    assert isinstance(advisory.speed_limit_mps, msgspec.UnsetType) is (says[0] == "S" and says[1] == "w")
+    candidate = m.Candidate(kind=m.CandidateKind.UNSURE_BOX, box_xyxy=(0.48, 0.7, 0.52, 0.8), confidence=0.3)
+    both = play([msgspec.structs.replace(frame, candidates=(candidate,))] * 3, CALIBRATED)[1][-1]
+    assert both.person_distance_m == advisory.person_distance_m
