@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import os
 import sys
 from importlib.metadata import EntryPoint, entry_points
@@ -42,15 +43,22 @@ def main(argv: list[str] | None = None) -> int:
         return 2
     except KeyboardInterrupt:
         return 130
-    except BrokenPipeError:  # the reader of our output went away
+    except OSError as error:
+        if error.errno not in {errno.EPIPE, errno.ENOSPC}:
+            raise
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+        if error.errno == errno.EPIPE:  # the reader of our output went away
+            return 0
+        sys.stderr.write(f"paani: {error.strerror}\n")
+        return 1
 
 
 def _run(name: str, rest: list[str], commands: dict[str, EntryPoint]) -> int:
     try:
         if name in commands:
-            return int(commands[name].load()(rest))
+            code = int(commands[name].load()(rest))
+            sys.stdout.flush()  # what cannot be written is said now, not by the interpreter at its end
+            return code
         return run_service(name, _service_config(name, rest))
     except ModuleNotFoundError as error:
         if (remedy := missing_module(name, error)) is None:

@@ -1,4 +1,4 @@
-"""Whole numbers that a command is given, checked while its options are parsed."""
+"""Numbers that a command is given, checked while its options are parsed."""
 
 from __future__ import annotations
 
@@ -20,3 +20,22 @@ def whole_number(least: int = 1, most: int | None = None) -> Callable[[str], int
         return number
 
     return parse
+
+
+def quantity(unit: str, low: float = 0.0, high: float = 1e7, *, with_low: bool = False) -> Callable[[str], float]:
+    """An argparse `type`: a number of this unit above `low`, or from it, and at most `high`; else one line says so."""
+    span = f"{unit} {'from' if with_low else 'above'} {low:g}, at most {high:g}"
+
+    def parse(text: str) -> float:
+        try:
+            number = float(text)
+        except ValueError:
+            raise argparse.ArgumentTypeError(f"'{text}' is no number") from None
+        if not low <= number <= high or (number == low and not with_low):
+            raise argparse.ArgumentTypeError(f"{text}: expected {span}")
+        return number
+
+    return parse
+
+
+seconds = quantity("seconds")

@@ -17,6 +17,7 @@ from paani.config import Config, DashboardConfig
 from paani.mission_client import MissionClient
 from paani.operator_client import OperatorClient
 from paani.page_address import LOGIN_PATH
+from paani.tuning_refusals import refusal_text
 from paani_services.dashboard.answers import ArmedAnswer, HeldAnswer, StopAnswer
 from paani_services.dashboard.connections import BoundedConnections
 from paani_services.dashboard.driving import Driving
@@ -263,7 +264,9 @@ async def serving(server: Server, config: DashboardConfig, tls: ssl.SSLContext |
 
 
 def tuning_response(shadow: m.Shadow | None) -> web.Response:
-    """The advisor's report; status 409 where it refused the request, 503 where it did not answer."""
+    """The advisor's report; status 409 and why where it refused the request, 503 where it did not answer."""
     if shadow is None:
         return error_response(503, "the advisor did not answer", keys.SHADOW.name)
-    return json_response(shadow, 200 if shadow.refusal is m.TuningRefusal.NONE else 409)
+    if shadow.refusal is not m.TuningRefusal.NONE:
+        return error_response(409, refusal_text(shadow), shadow.refused_path or keys.SHADOW.name)
+    return json_response(shadow)

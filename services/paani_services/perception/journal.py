@@ -28,7 +28,7 @@ class Journal:
         if len(line) + 2 > self._max_bytes:
             return False
         try:
-            self._newer.parent.mkdir(exist_ok=True)
+            self._newer.parent.mkdir(mode=0o700, exist_ok=True)
             with self._newer.open("a+b", buffering=0) as file:
                 size = file.seek(0, 2)
                 if size and os.pread(file.fileno(), 1, size - 1) != b"\n":

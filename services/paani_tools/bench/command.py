@@ -14,7 +14,7 @@ import msgspec
 
 from paani.cli import add_config_arguments, config_from
 from paani.errors import UserError
-from paani.option_numbers import whole_number
+from paani.option_numbers import seconds, whole_number
 from paani.option_paths import output_file
 from paani.statistics.figure_table import FigureTable, installed_commands, installed_tables, table_text
 from paani.statistics.measured import Machine, Report, measure_tables
@@ -25,7 +25,7 @@ from paani_tools.bench.planner import plan_among_obstacles, plan_recorded
 from paani_tools.bench.recording_cost import recorder
 from paani_tools.bench.steadiness import steadiness
 from paani_tools.replay.speed import measure_replay
-from paani_tools.up.command import seconds, up_sets
+from paani_tools.up.command import up_sets
 from paani_tools.up.lifecycle import Outcome, run_plan
 from paani_tools.up.plan import make_plan
 from paani_tools.up.terminal import Display

@@ -17,11 +17,11 @@ from paani.cli import add_config_arguments, config_from
 from paani.clock import WallClock
 from paani.config import Config
 from paani.keys import PORTS
-from paani.option_numbers import whole_number
+from paani.option_numbers import seconds, whole_number
 from paani.option_paths import output_file
 from paani.statistics.order_statistics import median
 from paani.whole_file import write_json
-from paani_tools.up.command import seconds, up_sets
+from paani_tools.up.command import up_sets
 from paani_tools.up.lifecycle import run_plan
 from paani_tools.up.plan import make_plan
 from paani_tools.up.run_summary import Percentiles, Report, ServiceFigures, percentiles

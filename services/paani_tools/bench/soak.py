@@ -15,10 +15,11 @@ import msgspec
 from paani.cli import add_config_arguments, config_from
 from paani.clock import MonotonicClock
 from paani.config import Config
+from paani.option_numbers import seconds
 from paani.option_paths import output_file
 from paani.runtime import runtime_dir
 from paani.whole_file import write_json
-from paani_tools.up.command import seconds, up_sets
+from paani_tools.up.command import up_sets
 from paani_tools.up.lifecycle import run_plan
 from paani_tools.up.plan import make_plan
 from paani_tools.up.terminal import Display

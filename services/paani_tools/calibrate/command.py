@@ -11,6 +11,7 @@ import sys
 from paani.cli import add_config_arguments, config_from
 from paani.config import CalibrationConfig
 from paani.errors import UserError
+from paani.option_numbers import quantity
 from paani.option_paths import input_path, output_file
 from paani.whole_file import write_whole
 from paani_tools.calibrate.gather import collect_live, collect_recorded, waterline_observations
@@ -73,26 +74,21 @@ def _parser() -> argparse.ArgumentParser:
         f"For the rest of the boat: {', '.join(f'paani calibrate {name}' for name in COMMANDS)}.",
     )
     parser.add_argument("recording", type=input_path(), nargs="?", help="a recording of the moored or slow boat")
-    parser.add_argument("--live", type=_seconds, metavar="SECONDS", help="listen to the running boat instead")
     parser.add_argument(
-        "--shore-m", type=_metres, required=True, metavar="METRES", help="how far away the shore in the picture is"
+        "--live",
+        type=quantity("seconds", 1.0, MAX_SECONDS, with_low=True),
+        metavar="SECONDS",
+        help="listen to the running boat instead",
+    )
+    parser.add_argument(
+        "--shore-m",
+        type=quantity("metres", 0.0, 1e6),
+        required=True,
+        metavar="METRES",
+        help="how far away the shore in the picture is",
     )
     parser.add_argument(
         "--out", type=output_file("--out"), metavar="FILE", help="write the calibration section here (TOML)"
     )
     add_config_arguments(parser)
     return parser
-
-
-def _seconds(text: str) -> float:
-    value = float(text)
-    if not 1.0 <= value <= MAX_SECONDS:
-        raise ValueError(text)
-    return value
-
-
-def _metres(text: str) -> float:
-    value = float(text)
-    if not 0.0 < value < 1e6:
-        raise ValueError(text)
-    return value

@@ -13,6 +13,7 @@ import msgspec
 from paani.cli import add_config_arguments, config_from
 from paani.clock import stopwatch_ms
 from paani.config import BusConfig
+from paani.option_numbers import seconds, whole_number
 from paani_tools.inspect.listen import is_up, messages, observer, rates
 from paani_tools.inspect.topic_table import topic_named, topics_markdown, topics_text
 
@@ -34,7 +35,7 @@ def echo(argv: list[str]) -> int:
     """Messages of one topic, one JSON line each."""
     parser = argparse.ArgumentParser(prog="paani echo", description="Messages of one topic, one JSON line each.")
     parser.add_argument("topic", help="for example advisor/advisory, health/plant")
-    parser.add_argument("--count", type=int, metavar="N", help="stop after N messages")
+    parser.add_argument("--count", type=whole_number(), metavar="N", help="stop after N messages")
     add_config_arguments(parser)
     options = parser.parse_args(argv)
     asyncio.run(_echo(config_from(options).bus, options.topic, options.count))
@@ -45,7 +46,7 @@ def hz(argv: list[str]) -> int:
     """The rate at which messages of one topic arrive."""
     parser = argparse.ArgumentParser(prog="paani hz", description="How often messages of one topic arrive.")
     parser.add_argument("topic", help="for example perception/evidence")
-    parser.add_argument("--for", dest="seconds", type=float, metavar="S", help="stop after S seconds")
+    parser.add_argument("--for", dest="seconds", type=seconds, metavar="S", help="stop after S seconds")
     add_config_arguments(parser)
     options = parser.parse_args(argv)
     asyncio.run(_hz(config_from(options).bus, options.topic, options.seconds or math.inf))

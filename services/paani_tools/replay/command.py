@@ -14,6 +14,7 @@ from paani import keys
 from paani.config import Config, with_settings
 from paani.errors import UserError
 from paani.logs.reader import Log, open_log
+from paani.option_numbers import quantity
 from paani.option_paths import input_path, output_file
 from paani.page_address import page_origin
 from paani.whole_file import write_json
@@ -30,6 +31,7 @@ LISTENING = ("bus.", "dashboard.")  # settings that matter to a republished driv
 def main(argv: list[str]) -> int:
     """Exit codes: 0 done (with `--check`: every decision is the same), 1 not the same, 2 user's mistake."""
     options = _parser().parse_args(argv)
+    _require_meaning(options)
     log = open_log(options.file)
     provenance = provenance_of(log, force=options.force or not options.check)
     if not options.check:
@@ -44,6 +46,27 @@ def main(argv: list[str]) -> int:
     if options.json is not None:
         write_json(options.json, report, "--json")
     return 1 if isinstance(report, CheckReport) and not report.is_exact else 0
+
+
+def _require_meaning(options: argparse.Namespace) -> None:
+    """Raises UserError for an option that would be passed over in silence."""
+    deciding = {"--json": options.json, "--force": options.force, "--chain": options.chain}
+    republishing = {
+        "--speed": options.speed != 1.0,
+        "--from": options.from_s > 0.0,
+        "--to": options.to_s < math.inf,
+        "--loop": options.loop,
+        "--only": options.only,
+        "--commands": options.commands,
+        "--dashboard": options.dashboard,
+    }
+    for name, value in (republishing if options.check else deciding).items():
+        if value:
+            raise UserError(f"{name}: {'republishes; --check decides' if options.check else 'goes with --check'}")
+    if options.chain and not options.sets:
+        raise UserError("--chain: goes with --set, of which each service is given the consequences")
+    if options.to_s <= options.from_s:
+        raise UserError(f"--to {options.to_s:g}: is not after --from {options.from_s:g}")
 
 
 def _republish(log: Log, recorded: Config, options: argparse.Namespace) -> int:
@@ -113,9 +136,25 @@ def _parser() -> argparse.ArgumentParser:
     again.add_argument("--json", type=output_file("--json"), metavar="FILE", help="write the report as JSON too")
     again.add_argument("--force", action="store_true", help="go on with a log of other settings or weights")
     play = parser.add_argument_group("republishing")
-    play.add_argument("--speed", type=_positive, default=1.0, metavar="X", help="X times as fast")
-    play.add_argument("--from", type=_seconds, default=0.0, metavar="S", dest="from_s", help="seconds since its start")
-    play.add_argument("--to", type=_seconds, default=math.inf, metavar="S", dest="to_s", help="seconds since its start")
+    play.add_argument(
+        "--speed", type=quantity("times", 0.01, 1000.0, with_low=True), default=1.0, metavar="X", help="X times as fast"
+    )
+    play.add_argument(
+        "--from",
+        type=quantity("seconds since the start", with_low=True),
+        default=0.0,
+        metavar="S",
+        dest="from_s",
+        help="seconds since its start",
+    )
+    play.add_argument(
+        "--to",
+        type=quantity("seconds since the start", with_low=True),
+        default=math.inf,
+        metavar="S",
+        dest="to_s",
+        help="seconds since its start",
+    )
     play.add_argument("--loop", action="store_true", help="again and again")
     play.add_argument("--only", nargs="+", metavar="TOPIC", help="only these topics")
     play.add_argument("--commands", action="store_true", help="commands, arming and heartbeats too")
@@ -125,18 +164,3 @@ def _parser() -> argparse.ArgumentParser:
         help="with --check: decide with this setting; else: a bus or dashboard setting; may be repeated",
     )  # fmt: skip
     return parser
-
-
-def _seconds(text: str) -> float:
-    """Seconds since the start, not negative."""
-    value = float(text)
-    if not 0.0 <= value < math.inf:
-        raise argparse.ArgumentTypeError(f"'{text}': expected seconds since the start")
-    return value
-
-
-def _positive(text: str) -> float:
-    value = float(text)
-    if not 0.01 <= value <= 1000.0:
-        raise argparse.ArgumentTypeError(f"'{text}': expected 0.01 to 1000")
-    return value

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import itertools
 import math
 import subprocess
@@ -17,6 +18,7 @@ from paani.errors import UserError
 from paani.fence_geometry import FENCE_WORDS, LAND_WORDS, BorderWords, find_route_violation
 from paani.geometry import geodetic_from_enu
 from paani.messages import FenceArea
+from paani.option_numbers import quantity
 from paani.option_paths import input_file, output_file
 from paani.whole_file import write_whole
 from paani_services.navigator.files.fence_file import load_fence
@@ -126,17 +128,11 @@ def _lat_lon(lat_lon_deg: LatLon) -> str:
 
 
 def _origin(text: str) -> LatLon:
-    latitude_deg, longitude_deg = (float(part) for part in text.split(","))
-    if not (-90.0 <= latitude_deg <= 90.0 and -180.0 <= longitude_deg <= 180.0):
-        raise ValueError(text)
-    return latitude_deg, longitude_deg
-
-
-def _metres(text: str) -> float:
-    value = float(text)
-    if not 0.0 < value <= 1000.0:
-        raise ValueError(text)
-    return value
+    with contextlib.suppress(ValueError):
+        latitude_deg, longitude_deg = (float(part) for part in text.split(","))
+        if -90.0 <= latitude_deg <= 90.0 and -180.0 <= longitude_deg <= 180.0:
+            return latitude_deg, longitude_deg
+    raise argparse.ArgumentTypeError(f"'{text}': expected LAT,LON in degrees, within 90 and 180")
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -146,7 +142,10 @@ def _parser() -> argparse.ArgumentParser:
     convert.add_argument("source", type=input_file(), metavar="IN")
     convert.add_argument("target", type=output_file(""), metavar="OUT")
     convert.add_argument(
-        "--thin", type=_metres, metavar="M", help="leave out points that lie less than M metres off the line"
+        "--thin",
+        type=quantity("metres", 0.0, 1000.0),
+        metavar="M",
+        help="leave out points that lie less than M metres off the line",
     )
     convert.add_argument("--repeat", action="store_true", help="the last waypoint leads back to the first")
     convert.add_argument("--origin", type=_origin, metavar="LAT,LON", help="origin of a route in metres that has none")

@@ -15,6 +15,7 @@ from paani.cli import add_config_arguments, config_from
 from paani.config import Config
 from paani.errors import UserError
 from paani.keys import Graph
+from paani.option_numbers import seconds
 from paani_tools.inspect.listen import observer
 from paani_tools.sensors.text import device_line, missing
 
@@ -28,7 +29,7 @@ def main(argv: list[str]) -> int:
         description="What each GPS, IMU and heading device of a running hull says, once a second, and what is missing. "
         "Exit code 1: at the end a device that is set was not in order.",
     )
-    parser.add_argument("--for", dest="seconds", type=_seconds, metavar="S", help="stop after S seconds")
+    parser.add_argument("--for", dest="seconds", type=seconds, metavar="S", help="stop after S seconds")
     parser.add_argument("--json", action="store_true", help="one JSON object a second instead of lines")
     add_config_arguments(parser)
     options = parser.parse_args(argv)
@@ -80,13 +81,3 @@ def _as_json(state: m.SensorsState, fix: m.GpsFix | None, sample: m.ImuSample | 
 
 def _is_in_order(device: m.SensorDevice) -> bool:
     return device.status in {m.SensorStatus.OFF, m.SensorStatus.OK}
-
-
-def _seconds(text: str) -> float:
-    try:
-        seconds = float(text)
-    except ValueError:
-        seconds = 0.0
-    if not 0.0 < seconds < math.inf:
-        raise argparse.ArgumentTypeError(f"'{text}': expected seconds above 0")
-    return seconds

@@ -13,9 +13,10 @@ from paani.config import Config, with_settings
 from paani.config.tuning import TUNABLE
 from paani.errors import UserError
 from paani.messages import Change, Shadow, TuningRefusal
+from paani.tuning_refusals import refusal_text
 from paani.undecodable import UNDECODABLE
 from paani_tools.tune.client import Client
-from paani_tools.tune.shadow_text import refusal_text, status_text
+from paani_tools.tune.shadow_text import status_text
 
 
 def main(argv: list[str]) -> int:

@@ -7,7 +7,8 @@ from collections.abc import Callable
 
 from paani.bus import open_bus
 from paani.clock import Clock
-from paani.config import BusConfig, Config
+from paani.config import Config
+from paani.errors import UserError
 from paani.messages import ArmRefusal
 from paani.operator_client import OperatorClient
 from paani.operator_key import ensure_operator_key, operator_key_path
@@ -17,9 +18,12 @@ CLIENT = "arm"
 ATTEMPTS = 5  # a process of a busy machine may miss a beat while everything starts
 
 
-async def arm_once(config: BusConfig, clock: Clock, say: Callable[[str], None]) -> None:
-    """Hold the button once. What was stopped stays stopped, and is said to be."""
-    bus = await open_bus(config, CLIENT, clock)
+async def arm_once(config: Config, clock: Clock, say: Callable[[str], None]) -> None:
+    """Hold the button once. What was stopped stays stopped, and is said to be.
+
+    Raises UserError where there is no page on which a hand could release the STOP: the boat would lie still.
+    """
+    bus = await open_bus(config.bus, CLIENT, clock)
     try:
         client, refusal = OperatorClient(bus, clock), None
         for _ in range(ATTEMPTS):
@@ -28,6 +32,11 @@ async def arm_once(config: BusConfig, clock: Clock, say: Callable[[str], None]) 
                 return
             if refusal in {ArmRefusal.LATCHED, ArmRefusal.STOPPED, ArmRefusal.NOT_WRITTEN}:
                 break
+        if refusal in {ArmRefusal.LATCHED, ArmRefusal.STOPPED} and not config.dashboard.serve:
+            raise UserError(
+                "not armed: a STOP holds, and without a page nobody can release it; start once without --headless and"
+                ' hold "Hold to arm" there'
+            )
         say("not armed: " + _why(refusal))
     finally:
         await bus.close()
@@ -49,8 +58,8 @@ def _why(refusal: ArmRefusal | None) -> str:
         case None:
             return "the operator's process does not answer"
         case ArmRefusal.LATCHED | ArmRefusal.STOPPED:
-            return "a STOP holds; a hand on the page releases it (hold Arm)"
+            return 'a STOP holds; a hand on the page releases it (hold "Hold to arm")'
         case ArmRefusal.NOT_WRITTEN:
             return "the STOP latch could not be written to disk"
         case _:
-            return f"the operator's process refuses ({refusal.value.lower()}); hold Arm on the page"
+            return f'the operator\'s process refuses ({refusal.value.lower()}); hold "Hold to arm" on the page'

@@ -13,6 +13,7 @@ from paani.cli import add_config_arguments, config_from
 from paani.config import Config
 from paani.errors import UserError
 from paani.keys import PORTS, Graph
+from paani.option_numbers import seconds
 from paani.option_paths import input_file, output_file, output_folder
 from paani.sides import Side
 from paani.whole_file import write_json
@@ -71,14 +72,6 @@ def up_sets(
     if record is not None:
         sets.append(f"recorder.folder={json.dumps(str(record.absolute()))}")
     return tuple(sets)
-
-
-def seconds(text: str) -> float:
-    """A positive number of seconds."""
-    value = float(text)
-    if not 0.0 < value < 1e7:
-        raise ValueError(text)
-    return value
 
 
 def _result(report: Report) -> str:

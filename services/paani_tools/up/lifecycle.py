@@ -106,7 +106,7 @@ async def _run(
             if plan.config.dashboard.serve and "dashboard" in plan.services:
                 display.print_line(await asyncio.to_thread(page_line, plan.config))
             if plan.config.up.arm_at_start and "operator" in plan.services:
-                await arm_once(plan.config.bus, clock, display.print_line)
+                await arm_once(plan.config, clock, display.print_line)
             summary.begin(clock.now_us())
             await during()
             for task in tasks:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Sequence
 from typing import TextIO
 
@@ -25,7 +26,8 @@ class Display:
         """Progress of the start. On a plain stream a line appears only when the number alive changes."""
         names = ", ".join(missing)
         if self._updating:
-            self._write(f"{CLEAR}starting  {alive}/{total}  {elapsed_s:4.1f} s  waiting for {names}")
+            width = shutil.get_terminal_size().columns - 1  # a longer line goes on in the next, which nothing clears
+            self._write(CLEAR + f"starting  {alive}/{total}  {elapsed_s:4.1f} s  waiting for {names}"[:width])
             self._shown = names
         elif names != self._shown:
             self._write(f"starting  {alive}/{total}  {elapsed_s:4.1f} s  waiting for {names}\n")

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from paani.config.section import Fraction, NonNegative, Positive, Section, Size
+from paani.config.section import Fraction, JpegQuality, NonNegative, Positive, Section, Size
 
 EngineName = Literal["onnxruntime", "ncnn"]
 WeightSet = Literal["full", "open", "paper"]
@@ -26,7 +26,7 @@ class CameraConfig(Section, frozen=True):
     loop: bool = True  # a recording begins again at its end
     width_px: Size = 320  # A8
     height_px: Size = 240  # A8
-    jpeg_quality: Size = 85  # of 100: small enough for a slow link, fine enough for the networks
+    jpeg_quality: JpegQuality = 85  # small enough for a slow link, fine enough for the networks
 
 
 class ImageQualityConfig(Section, frozen=True):

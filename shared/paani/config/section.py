@@ -10,6 +10,7 @@ Positive = Annotated[float, msgspec.Meta(gt=0.0, le=1e9)]
 NonNegative = Annotated[float, msgspec.Meta(ge=0.0, le=1e9)]
 Fraction = Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
 Size = Annotated[int, msgspec.Meta(ge=1, le=10_000)]
+JpegQuality = Annotated[int, msgspec.Meta(ge=1, le=100)]
 Tilt = Annotated[float, msgspec.Meta(ge=-60.0, le=60.0)]  # degrees of a camera's mount
 Offset = Annotated[float, msgspec.Meta(ge=-50.0, le=50.0)]  # metres of a camera's mount
 

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import msgspec
 
-from paani.config.section import Fraction, NonNegative, Offset, Positive, Section, Size, Tilt
+from paani.config.section import Fraction, JpegQuality, NonNegative, Offset, Positive, Section, Size, Tilt
 from paani.keys import VITAL_SERVICES
 
 LensTerm = Annotated[float, msgspec.Meta(ge=-10.0, le=10.0)]
@@ -77,7 +77,7 @@ class EyeConfig(Section, frozen=True):
     rate_hz: Positive = 5.0  # as `camera.rate_hz`
     width_px: Size = 320  # as `camera.width_px`
     height_px: Size = 240  # as `camera.height_px`
-    jpeg_quality: Size = 85  # as `camera.jpeg_quality`
+    jpeg_quality: JpegQuality = 85  # as `camera.jpeg_quality`
     camera_height_m: Positive = 0.9  # above the water, boat at rest
     camera_forward_m: Offset = 0.55  # ahead of the boat's middle
     pitch_down_deg: Tilt = 6.0  # shows the water before the bow, and the horizon at 0.4 of the picture's height

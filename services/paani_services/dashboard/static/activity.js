@@ -39,7 +39,7 @@ export function describeActivity(store, now) {
 /** What else keeps the boat still. @param {import("./inhibits.js").StopReason[]} inhibits */
 function otherReason(inhibits) {
   const other = inhibits.find((reason) => reason.code !== "NOT_ARMED" && reason.stage !== "gate");
-  return other ? `${ACTIVITY_TEXTS.and} ${other.text}` : ACTIVITY_TEXTS.nothingElse;
+  return other ? other.text : ACTIVITY_TEXTS.nothingElse;
 }
 
 /** Who drives by hand, and what the advice has to say in it. @param {import("./store.js").Store} store @param {any} command @param {string} what */

@@ -312,7 +312,7 @@ export const MODE_TEXTS = {
 export const WHEEL_TEXTS = { unknown: "–", nobody: "nobody", thisPage: "this page", otherPage: "another page", silent: "no word from the operator's process", holds: "holds the wheel" };
 
 /** Beside the button that arms. */
-export const ARM_TEXTS = { hold: "Hold to arm", release: "Release to arm", armed: "Armed", stands: "Armed, the boat still stands:", nothing: "Nothing else keeps the boat still." };
+export const ARM_TEXTS = { hold: "Hold to arm", release: "Release to arm", armed: "Armed", stands: "Armed, the boat still stands:", nothing: "Nothing else keeps the boat still.", tooShort: "not armed: held for less than a second", tooLong: "not armed: held for more than five seconds" };
 
 /** Why a mode may not start, in a few words. @type {Record<string, string>} */
 export const MODE_BARS = {

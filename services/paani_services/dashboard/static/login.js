@@ -32,7 +32,7 @@ function takeKey() {
 }
 
 function renderStop() {
-  const pending = pendingStop(performance.now());
+  const pending = pendingStop(performance.now(), 0);
   if (pending) isLatched = false;
   const note = byId("stop-note");
   note.dataset.state = pending?.state ?? (isLatched ? "stopped" : "");

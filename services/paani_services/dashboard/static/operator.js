@@ -37,7 +37,8 @@ function hold() {
 function release(mayArm) {
   clearInterval(refreshing);
   const heldMs = performance.now() - heldFrom;
-  if (heldFrom && mayArm && heldMs >= HOLD_MS && heldMs <= EXPIRES_MS) void send("release");
+  if (heldFrom && mayArm && heldMs < HOLD_MS) refusal = ARM_TEXTS.tooShort;
+  else if (heldFrom && mayArm && heldMs <= EXPIRES_MS) void send("release");
   heldFrom = 0;
 }
 
@@ -68,6 +69,7 @@ export function bindOperatorControls() {
 export function renderOperatorState(store, open, now, isPast) {
   const operator = store.get("operator/state"), state = /** @type {HTMLElement} */ (document.querySelector(".order-state"));
   const heldMs = heldFrom ? now - heldFrom : 0;
+  if (heldMs > EXPIRES_MS) refusal = ARM_TEXTS.tooLong;
   if (heldMs > EXPIRES_MS || isPast) release(false);
   const button = byId("arm");
   const isHeard = open && store.isFresh("operator/state", now);
@@ -78,7 +80,7 @@ export function renderOperatorState(store, open, now, isPast) {
   remaining.value = JSON.stringify(heldFrom ? findInhibits(store, now).filter((reason) => !isOfArming(reason)) : null);
   setText(byId("wheel"), describeWheel(isHeard ? operator : undefined).name);
   byId("stop").dataset.latched = String(Boolean(operator?.stopped));
-  const shown = pendingStop(now) ?? (isReplay(store) ? { state: "", word: ORDER_TEXTS.readOnly, detail: ORDER_TEXTS.played } : operatorState(operator, isHeard, store.ageS("operator/state", now)));
+  const shown = pendingStop(now, 1000 * store.ageS("operator/state", now)) ?? (isReplay(store) ? { state: "", word: ORDER_TEXTS.readOnly, detail: ORDER_TEXTS.played } : operatorState(operator, isHeard, store.ageS("operator/state", now)));
   state.dataset.state = shown.state;
   setText(byId("order-word"), shown.word);
   setText(byId("order-detail"), refusal || shown.detail);

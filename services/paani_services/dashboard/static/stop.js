@@ -9,6 +9,7 @@ const RETRY_MS = 400, ANSWER_MS = 2000, PAD_PERIOD_MS = 40;
 const PAD_BUTTON = 1; // B of the standard layout, the circle of others
 export const CONFIRM_MS = 1000; // a STOP that takes longer is said to be not confirmed
 let isPending = false, askedAt = 0;
+let answeredAt = 0; // when the server said that a STOP is latched; 0 once the operator's process has spoken since
 
 async function stop() {
   if (isPending) return;
@@ -16,7 +17,7 @@ async function stop() {
   askedAt = performance.now();
   while (isPending) {
     try {
-      if ((await fetch("/api/stop", { method: "POST", signal: AbortSignal.timeout?.(ANSWER_MS) })).ok) isPending = false;
+      if ((await fetch("/api/stop", { method: "POST", signal: AbortSignal.timeout?.(ANSWER_MS) })).ok) isPending = false, (answeredAt = performance.now());
     } catch { /* asked again below */ }
     if (isPending) await new Promise((resolve) => setTimeout(resolve, RETRY_MS));
   }
@@ -49,9 +50,10 @@ function bindPad(press) {
   }, PAD_PERIOD_MS);
 }
 
-/** A STOP that the server has not answered yet; null where there is none. @param {number} now */
-export function pendingStop(now) {
-  if (!isPending) return null;
+/** A STOP that the operator's process has not confirmed yet; null where there is none. @param {number} now @param {number} heardAgoMs since its newest word came */
+export function pendingStop(now, heardAgoMs) {
+  if (now - heardAgoMs >= answeredAt) answeredAt = 0;
+  if (!isPending && !answeredAt) return null;
   const waitedMs = now - askedAt;
   if (waitedMs <= CONFIRM_MS) return { state: "asked", word: ORDER_TEXTS.asked, detail: ORDER_TEXTS.askedAgo(fixed(waitedMs, 0)) };
   return { state: "unconfirmed", word: ORDER_TEXTS.notConfirmed, detail: ORDER_TEXTS.nobody(fixed(waitedMs / 1000, 0)) };

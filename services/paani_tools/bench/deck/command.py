@@ -12,7 +12,7 @@ from paani.cli import add_config_arguments, config_from
 from paani.config import Config
 from paani.errors import UserError
 from paani.extras import require_modules
-from paani.option_numbers import whole_number
+from paani.option_numbers import seconds, whole_number
 from paani.option_paths import output_file
 from paani.page_address import is_page_exposed, page_host
 from paani.whole_file import write_json
@@ -20,7 +20,7 @@ from paani_tools.bench.deck.picture_path import spread_of_stages
 from paani_tools.bench.deck.report import Crowd, DeckReport, deck_text, heap_slope, keeps_bars, ratio_of_medians
 from paani_tools.bench.deck.slow_link import slow_link
 from paani_tools.inspect.listen import observer
-from paani_tools.up.command import seconds, up_sets
+from paani_tools.up.command import up_sets
 from paani_tools.up.lifecycle import run_plan
 from paani_tools.up.plan import make_plan
 from paani_tools.up.run_summary import percentiles

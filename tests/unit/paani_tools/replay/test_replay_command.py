@@ -133,7 +133,7 @@ def test_other_weights_need_force_and_say_what_it_means(capsys: pytest.CaptureFi
         (("--set", "advisor.policy.tie=0.1"), "takes only bus and dashboard settings"),
         (("--only", "no/such"), "--only no/such"),
         (("--only", "controller/thrust"), "--commands"),
-        (("--set", "bus.router=nowhere"), "bus.router nowhere"),
+        (("--set", "bus.router=nowhere"), "router nowhere: expected"),
         (("--set", "bus.router=tcp/192.0.2.1:7"), "bus.router tcp/192.0.2.1:7"),
     ],
     ids=["unknown setting", "bad value", "folder", "no use", "topic", "command", "address", "foreign address"],

@@ -9,10 +9,11 @@ from paani import messages as m
 from paani.cli import main as paani
 from paani.config import load_config
 from paani.errors import UserError
+from paani.tuning_refusals import REFUSED, refusal_text
 from paani_services.dashboard.requests import BadRequestError, decode_body
 from paani_services.dashboard.tuning import ProposalRequest, ProposeRequest, describe_change, is_answer
 from paani_tools.tune.command import changes_from
-from paani_tools.tune.shadow_text import REFUSED, refusal_text, status_text
+from paani_tools.tune.shadow_text import status_text
 from tests.conftest import find_free_port
 
 CONFIG = load_config()
