@@ -103,6 +103,11 @@ def stopwatch_ms() -> float:
     return time.perf_counter_ns() * 1e-6
 
 
+def uptime_s() -> float:
+    """Seconds since the machine was started, sleep included: as `/proc/uptime`, whatever becomes of the wall clock."""
+    return time.clock_gettime(time.CLOCK_BOOTTIME)
+
+
 def process_cpu_s() -> float:
     """CPU seconds this process has used."""
     return time.process_time()

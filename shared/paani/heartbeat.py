@@ -1,5 +1,6 @@
 """Tells whoever supervises this process that it lives: systemd by its socket, a container's health check by a file.
 
+The file holds the machine's uptime at the last beat: a wall clock may be set.
 The protocol of systemd's socket is that of sd_notify(3): datagrams of `NAME=VALUE` lines to what NOTIFY_SOCKET names.
 """
 
@@ -9,6 +10,8 @@ import contextlib
 import os
 import socket
 from pathlib import Path
+
+from paani.clock import uptime_s
 
 FOLDER = "heartbeats"
 
@@ -35,6 +38,7 @@ class Heartbeat:
         with contextlib.suppress(OSError):  # a full disk stops no boat
             self._path.parent.mkdir(mode=0o700, exist_ok=True)
             self._path.touch(mode=0o600)
+            self._path.write_text(f"{uptime_s():.0f}\n", encoding="ascii")
 
     def _notify(self, text: str) -> None:
         if not self._address:

@@ -99,7 +99,7 @@ class Supervisor:
     async def keep_running(self, name: str) -> None:
         """Start one process whenever it is not running.
 
-        Raises UserError when it ends with a user's mistake, NotKeptAlive when it cannot be started.
+        Raises UserError when it ends with a user's mistake before it was ever alive, NotKeptAlive when it cannot start.
         """
         unit = self.units[name]
         while not self._stopping:
@@ -109,7 +109,8 @@ class Supervisor:
             code = await unit.process.wait()
             self._silence.ended(name)
             self._set_alive(unit, alive=False)
-            if code == USER_MISTAKE and not (name == RECORDER and unit.ever_alive):  # the boat goes on without it
+            # What worked before is no mistake in the settings: a camera was pulled out, a disk is gone.
+            if code == USER_MISTAKE and not unit.ever_alive:
                 raise UserError(await asyncio.to_thread(_mistake_text, unit))
             delay_s = unit.backoff.after((self._clock.now_us() - started_us) * 1e-6)
             if not unit.ever_alive and unit.backoff.failures >= GIVE_UP_FAILURES:

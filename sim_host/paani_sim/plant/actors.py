@@ -39,6 +39,14 @@ class ActorPath:
             east_m, north_m = east, north
         return Pose2(x_m, y_m, math.atan2(north_m, east_m))
 
+    def keep_on(self, along_m: float) -> float:
+        """The same distance, no further than the path leads: at the end of an open one the actor stays."""
+        return along_m if self._closed else min(max(along_m, 0.0), self._arc_m[-1])
+
+    def goes_on(self, along_m: float, speed_mps: float) -> bool:
+        """Whether the path leads on from there, ahead or, with a negative speed, back."""
+        return self._closed or (along_m < self._arc_m[-1] if speed_mps > 0.0 else along_m > 0.0)
+
     def _point(self, along_m: float) -> tuple[float, float, float, float]:
         arc_m = self._arc_m
         at_m = along_m % arc_m[-1] if self._closed else min(max(along_m, 0.0), arc_m[-1])
@@ -102,9 +110,12 @@ class Actors:
                 speed = yielding_speed_mps(actor, pose, boat_xy_m, self._boat_reach_m)
                 if actor.behaviour is Behaviour.GIVES_WAY:
                     speed = self._apply_patience(number, speed, pose, boat_xy_m)
-            holds_on = actor.behaviour is Behaviour.HOLDS_ON
-            along.append(actor_distance_along_m(actor, t_s) if holds_on else along_m + speed * self._every_s)
-            speeds.append(speed)
+            if actor.behaviour is Behaviour.HOLDS_ON:
+                reached_m = actor_distance_along_m(actor, t_s)
+            else:
+                reached_m = self._paths[number].keep_on(along_m + speed * self._every_s)
+            along.append(reached_m)
+            speeds.append(speed if self._paths[number].goes_on(reached_m, speed) else 0.0)
         self.along_m, self.speeds_mps = tuple(along), tuple(speeds)
         self.poses = [path.pose_at(along_m) for path, along_m in zip(self._paths, along, strict=True)]
 

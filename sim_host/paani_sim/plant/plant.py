@@ -86,8 +86,8 @@ class Plant:
         boat = self._model.body("boat").id
         self._boat_geoms = frozenset(np.flatnonzero(self._model.geom_bodyid == boat).tolist())
         self._geom_names = [self._model.geom(geom).name for geom in range(self._model.ngeom)]
-        self._actors = Actors(world.actors, ACTORS_EVERY_S, 0.5 * hull.length_m)
         self._actors_every = max(1, round(ACTORS_EVERY_S / config.step_s))
+        self._actors = Actors(world.actors, self._actors_every * config.step_s, 0.5 * hull.length_m)
         self._mocap = [self._model.body(actor.id).mocapid[0] for actor in world.actors]
         self._vessels = [index for index, actor in enumerate(world.actors) if makes_waves(actor)]
 

@@ -191,6 +191,8 @@ def _list_suite_cases(options: argparse.Namespace, choice: SeedChoice) -> list[T
     worlds = options.scenario or options.worlds or list(SUITES[options.suite].worlds)
     known = (*DRAWN_WORLDS, *IMAZU_SCENARIOS)
     for world in worlds:
+        if options.scenario and not is_fixed_scenario(world):
+            raise UserError(f"--scenario {world}: is no written scenario (its drawn kin: --worlds)")
         if options.scenario:
             load_scenario(world)
         elif world not in known:

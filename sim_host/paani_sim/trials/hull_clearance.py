@@ -12,15 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paani.arrays import F64
-from paani_sim.trials.silhouettes import MAX_FLOATING_BASE_M
 from paani_sim.vessels.vessel import Hull
 from paani_sim.worlds import Actor, Obstacle, Pose2, World
 from paani_sim.worlds.footprint import build_outline, is_round, place_outline
+from paani_sim.worlds.passability import HEADROOM_M
 
 MAX_CLEARANCE_M = 12.0  # larger clearances count as this
 BANK = "bank"
 CORNER_SIGNS = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]], np.float64)
 MOMENTS_PER_CHUNK = 32
+OUTLINE_SPACING_M = 0.2  # of the places of an outline that are looked at
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,11 +46,11 @@ class HullPath:
 
 def list_waterborne(world: World) -> tuple[Obstacle | Actor, ...]:
     """Things that stand or move in the water, low enough for a hull to touch."""
-    return (*(each for each in world.obstacles if each.base_z_m < MAX_FLOATING_BASE_M), *world.actors)
+    return (*(each for each in world.obstacles if each.base_z_m <= HEADROOM_M), *world.actors)
 
 
 def compute_clearances_m(world: World, hull_path: HullPath) -> dict[str, F64]:
-    """From the hull to each thing afloat, by id, and to the bank, `(n,)`; at most FAR_M, 0 where they overlap."""
+    """From the hull to each thing afloat, by id, and to the bank, `(n,)`; at most `MAX_CLEARANCE_M`, 0 in them."""
     found = {}
     actors = [actor.id for actor in world.actors]
     for thing in list_waterborne(world):
@@ -81,14 +82,23 @@ def compute_actor_poses(actor: Actor, along_m: F64) -> F64:
 
 
 def was_visible(
-    world: World, what: str, hull_path: HullPath, half_fov_rad: float, range_m: float, ahead_m: float
+    world: World,
+    what: str,
+    hull_path: HullPath,
+    half_fov_rad: float,
+    range_m: float,
+    ahead_m: float,
+    height_m: float = 0.0,
 ) -> bool:
     """Whether any part of a thing was, at any of these moments, in the field of view, in range and not occluded.
 
-    what: the id of a thing, or BANK for the stretch of bank next to where the course ends. ahead_m: of the camera.
+    what: the id of a thing, or BANK for the stretch of bank next to where the course ends. ahead_m, height_m: of the
+    camera, which sees over everything that is lower.
     """
     things = list_waterborne(world)
     actors = [actor.id for actor in world.actors]
+    bases_m = {each.id: each.base_z_m for each in world.obstacles}
+    tops_m = {each.id: bases_m.get(each.id, 0.0) + each.height_m for each in things}
     last = len(hull_path.x_m) - 1
     for k in range(last + 1):
         camera_m = np.array(
@@ -108,7 +118,7 @@ def was_visible(
             end = np.array([hull_path.x_m[last], hull_path.y_m[last]])
             targets = _find_nearest_on_edges(world.shore_m, end)[None, :]
         else:
-            targets = np.vstack([outlines[what], outlines[what].mean(axis=0)])
+            targets = np.vstack([_walk_round(outlines[what]), outlines[what].mean(axis=0)])
         rel = targets - camera_m
         distance_m = np.hypot(rel[:, 0], rel[:, 1])
         bearing = np.arctan2(rel[:, 1], rel[:, 0]) - hull_path.yaw_rad[k]
@@ -116,13 +126,26 @@ def was_visible(
         in_view = (distance_m <= range_m) & (np.abs(bearing) <= half_fov_rad)
         if not in_view.any():
             continue
-        occluders = [np.stack([o, np.roll(o, -1, axis=0)], axis=1) for name, o in outlines.items() if name != what]
+        occluders = [
+            np.stack([o, np.roll(o, -1, axis=0)], axis=1)
+            for name, o in outlines.items()
+            if name != what and tops_m[name] >= height_m
+        ]
         if what != BANK:
             occluders.append(np.stack([world.shore_m, np.roll(world.shore_m, -1, axis=0)], axis=1))
         segments = np.concatenate(occluders) if occluders else np.empty((0, 2, 2))
         if any(not _is_occluded(camera_m, target, segments) for target in targets[in_view]):
             return True
     return False
+
+
+def _walk_round(outline: F64) -> F64:
+    """Places along a closed outline, `OUTLINE_SPACING_M` apart and less, its corners among them."""
+    places = []
+    for corner, following in zip(outline, np.roll(outline, -1, axis=0), strict=True):
+        count = 1 + int(np.hypot(*(following - corner)) / OUTLINE_SPACING_M)
+        places.append(corner + np.arange(count)[:, None] / count * (following - corner))
+    return np.concatenate(places)
 
 
 def _distance_to_thing_m(thing: Obstacle | Actor, poses: F64, hull_path: HullPath) -> F64:

@@ -133,7 +133,7 @@ def find_contacts(
 ) -> tuple[Contact, ...]:
     """Find each time the hull began to touch something, and whether the camera could have seen it before.
 
-    Scraping along a thing is one contact: it ends when there is none for `CONTACT_GAP_S`.
+    Touches of one thing that begin within `CONTACT_GAP_S` of each other are one contact, as of a hull that scrapes.
     """
     kinds, found, last_s = map_kinds(world), list[Contact](), dict[str, float]()
     half_fov_rad = math.radians(0.5 * eye.hfov_deg)
@@ -155,7 +155,9 @@ def find_contacts(
                 y_m=round(samples[k].y_m, 2),
                 speed_mps=round(abs(samples[max(0, k - 2)].surge_mps), 3),
                 visible=kinds.get(what) != SHOAL
-                and was_visible(world, what, before, half_fov_rad, VISIBLE_RANGE_M, eye.camera_forward_m),
+                and was_visible(
+                    world, what, before, half_fov_rad, VISIBLE_RANGE_M, eye.camera_forward_m, eye.camera_height_m
+                ),
             )
         )
     return tuple(found)

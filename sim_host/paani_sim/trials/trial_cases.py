@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import zlib
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -66,6 +67,8 @@ class TrialCase(msgspec.Struct, frozen=True, order=True):
     def stem(self) -> str:
         """Stem of the names of the files that belong to this case."""
         place = Path(self.world).stem if is_fixed_scenario(self.world) else self.world
+        if self.world.endswith(".toml"):  # files of one name in two folders are two scenarios
+            place += f"-{hashlib.sha256(str(Path(self.world).absolute()).encode()).hexdigest()[:8]}"
         return f"{place}{self._changes}-{self.seed}-{self.policy.value}"
 
     @property
@@ -87,6 +90,7 @@ class TrialSuite(msgspec.Struct, frozen=True, kw_only=True):
     other_faults: int = 0
 
 
+MAX_SEED_DIGITS = 18
 SUITES = {
     "quick": TrialSuite(seed_count=2, paper_seed_stride=2),
     "standard": TrialSuite(seed_count=50, paper_seed_stride=10, camera_faults=3, other_faults=1),
@@ -149,7 +153,7 @@ def parse_case(text: str) -> TrialCase:
         raise UserError(f"--one {text}: no fault '{fault}' (have: {', '.join(FaultKind)})")
     if policy not in set(Policy):
         raise UserError(f"--one {text}: no policy '{policy}' (have: {', '.join(Policy)})")
-    if not seed.isdecimal():
+    if not seed.isdecimal() or len(seed) > MAX_SEED_DIGITS:
         raise UserError(f"--one {text}: '{seed}' is no seed")
     _require_sweepable(world, swept)
     return TrialCase(world, int(seed), Policy(policy), fault, swept)

@@ -1,5 +1,6 @@
 """Checks a scenario: route, boat and floating things in the water, clear of each other and inside the fence."""
 
+import re
 from collections import Counter
 
 import numpy as np
@@ -19,6 +20,7 @@ HULL_RADIUS_M = 0.75  # half the diagonal of a 1.3 x 0.75 m hull
 HALF_BEAM_M = 0.375
 SAMPLE_M = 0.5
 MIN_LEG_M = 0.05
+RESERVED_ID = re.compile(r"boat$|(?:bank|hull|keel|shoal)(?:_|$)")  # parts of the model: the boat, land and bottom
 
 
 def check_scenario(scenario: Scenario, where: str, names: dict[str, str]) -> None:
@@ -28,6 +30,9 @@ def check_scenario(scenario: Scenario, where: str, names: dict[str, str]) -> Non
     twice = [name for name, count in Counter(thing.id for thing in things).items() if count > 1]
     if twice:
         raise UserError(f"{where}: {names.get(twice[0], 'actors')}.id: {twice[0]!r} is there twice")
+    taken = [thing.id for thing in things if RESERVED_ID.match(thing.id)]
+    if taken:
+        raise UserError(f"{where}: {names.get(taken[0], 'actors')}.id: {taken[0]!r} is a name of the simulator's own")
     for area in scenario.fence:
         _check_area(np.array([(corner.x_m, corner.y_m) for corner in area.corners]), f"{where}: fence.keep_{area.keep}")
     _check_route(world, scenario.fence, where)

@@ -11,6 +11,7 @@ from paani_sim.vessels import Vessel, load_vessel
 from paani_sim.worlds.bathymetry import SHOAL_GEOM_PREFIX, semi_axes_m
 from paani_sim.worlds.curves import simplify_polygon
 from paani_sim.worlds.footprint import CORNERS, build_outline, is_round, is_shaped
+from paani_sim.worlds.passability import HEADROOM_M
 from paani_sim.worlds.world import Actor, Obstacle, World, actor_pose_at
 
 TIMESTEP_S = 0.01
@@ -139,7 +140,7 @@ def _add_shoals(spec: mujoco.MjSpec, world: World) -> None:
 
 def _add_obstacle(spec: mujoco.MjSpec, obstacle: Obstacle) -> None:
     pose = obstacle.pose
-    low_m = obstacle.base_z_m if obstacle.base_z_m > 2.0 else -_SUBMERGED_M
+    low_m = obstacle.base_z_m if obstacle.base_z_m > HEADROOM_M else -_SUBMERGED_M
     high_m = obstacle.base_z_m + obstacle.height_m
     _add_solid(
         spec,

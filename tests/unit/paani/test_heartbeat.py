@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import os
 import socket
+import subprocess
 from pathlib import Path
 
 import pytest
 
+from paani.clock import uptime_s
 from paani.heartbeat import FOLDER, Heartbeat
+from tests.places import ROOT
 
 
 @pytest.mark.parametrize("is_abstract", [False, True])
@@ -28,9 +31,22 @@ def test_the_file_is_young_while_the_process_lives(tmp_path: Path, monkeypatch: 
     monkeypatch.delenv("NOTIFY_SOCKET", raising=False)
     heartbeat, path = Heartbeat(tmp_path, "advisor"), tmp_path / FOLDER / "advisor"
     heartbeat.ready()
-    os.utime(path, (1.0, 1.0))
+    path.write_text("1\n")
     heartbeat.beat()
-    assert path.stat().st_mtime > 1e9
+    assert abs(int(path.read_text()) - uptime_s()) <= 2.0
+
+
+@pytest.mark.parametrize(("age_s", "is_well"), [(0, True), (3, True), (7, False), (10, False), (None, False)])
+def test_a_container_is_well_while_its_beat_is_young_whatever_the_wall_clock_says(
+    tmp_path: Path, age_s: int | None, is_well: bool
+) -> None:
+    beat = tmp_path / "advisor"
+    beat.write_text("" if age_s is None else f"{uptime_s() - age_s:.0f}\n")
+    os.utime(beat, (1.0, 1.0))
+    done = subprocess.run(
+        ["sh", ROOT / "deploy/beats.sh", "advisor"], env={"HEARTBEATS": str(tmp_path), "PATH": os.defpath}, check=False
+    )
+    assert (done.returncode == 0) is is_well
 
 
 def test_a_supervisor_that_is_gone_and_a_disk_that_is_full_stop_no_boat(

@@ -113,3 +113,19 @@ def test_an_actor_that_yields_does_not_touch_a_boat_alongside(x_m: float, sense:
         speeds.append(actors.speeds_mps[0])
     assert speeds[-1] == sense * 0.4
     assert min(sense * speed for speed in speeds) >= 0.0
+
+
+@pytest.mark.parametrize("behaviour", [Behaviour.GIVES_WAY, Behaviour.FLEES])
+def test_at_the_end_of_its_path_an_actor_stays_and_leaves_it_again_at_once(behaviour: Behaviour) -> None:
+    actor = straight(behaviour)
+    actors, far, t_s = Actors((actor,), EVERY_S, 0.65), (0.0, 500.0), 0.0
+    length_m = float(np.linalg.norm(actor.path_m[-1] - actor.path_m[0]))
+    for _ in range(round(2.0 * length_m / actor.speed_mps / EVERY_S)):
+        t_s += EVERY_S
+        actors.advance(t_s, far)
+    assert actors.along_m == (length_m,)
+    assert actors.speeds_mps == (0.0,), "and no receiver is told otherwise"
+    if behaviour is Behaviour.FLEES:
+        x_m, y_m, yaw_rad = actors.poses[0]
+        actors.advance(t_s + EVERY_S, (x_m + math.cos(yaw_rad), y_m + math.sin(yaw_rad)))
+        assert actors.along_m[0] < length_m

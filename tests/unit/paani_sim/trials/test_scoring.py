@@ -10,6 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from paani import messages as m
+from paani.config import load_config
+from paani_sim.plant.plant import ContactStart
 from paani_sim.trials.drive_history import DriveHistory, DriveSample, StopInterval, ThrustChange
 from paani_sim.trials.fault_reactions import measure_reactions
 from paani_sim.trials.hull_clearance import (
@@ -27,6 +29,7 @@ from paani_sim.trials.route_progress import RouteProgress
 from paani_sim.trials.scoring import (
     build_hull_path,
     classify_closeness,
+    find_contacts,
     find_encounters,
     summarise_latency,
     summarise_stops,
@@ -161,6 +164,49 @@ def test_actors_are_where_the_world_says(along_m: float) -> None:
 def test_visibility_to_the_camera(places: list[tuple[float, float, float]], what: str, seen: bool) -> None:
     world = with_things(BUOY, BARGE)
     assert was_visible(world, what, hull_path(POND, places), math.radians(35.0), 15.0, 0.55) is seen
+
+
+def test_any_part_of_a_thing_is_seen_and_what_is_lower_than_the_camera_hides_nothing() -> None:
+    """Along a hull of 20 m only its middle third is in view; a log before it is looked over."""
+    narrowboat = Obstacle("boat", Kind.VESSEL, "narrowboat", Pose2(5.0, 0.0, 0.5 * math.pi), 20.0, 2.0, 1.5)
+    log = Obstacle("log", Kind.OTHER, "log", Pose2(2.0, 0.0, 0.5 * math.pi), 6.0, 0.4, 0.25)
+    wall = dataclasses.replace(log, id="wall", height_m=2.5)
+    at = hull_path(POND, [(0.0, 1.0, 0.0)])
+    seen = [
+        was_visible(with_things(narrowboat, *between), "boat", at, math.radians(20.0), 15.0, 0.55, 0.9)
+        for between in ((), (log,), (wall,))
+    ]
+    assert seen == [True, True, False]
+
+
+def test_a_bridge_that_a_hull_can_touch_is_scored() -> None:
+    low = dataclasses.replace(BARGE, base_z_m=0.3)
+    high = dataclasses.replace(BARGE, id="bridge", base_z_m=2.1)
+    assert set(compute_clearances_m(with_things(low, high), hull_path(POND, [(0.0, 0.0, 0.0)]))) == {"barge", BANK}
+
+
+def contacts(*starts: tuple[float, str]) -> list[tuple[str, float, bool]]:
+    """Of a boat that drives towards the buoy and, a quarter of a minute later, away from it."""
+    places = [(-8.0 + 0.05 * k, 3.0, 0.0) for k in range(600)]
+    history = [sample._replace(actors_along_m=()) for sample in samples(places)]
+    world = with_things(BUOY, BARGE)
+    path = build_hull_path(world, HULL, history)
+    found = find_contacts(world, [ContactStart(*start) for start in starts], history, path, load_config().eye)
+    return [(each.what, each.at_s, each.visible) for each in found]
+
+
+def test_touches_that_follow_each_other_within_five_seconds_are_one_contact() -> None:
+    touches = [(10.0, "buoy"), (14.9, "buoy"), (19.8, "buoy"), (24.9, "buoy"), (25.0, "barge")]
+    assert [each[:2] for each in contacts(*touches)] == [("buoy", 10.0), ("buoy", 24.9), ("barge", 25.0)]
+
+
+def test_all_pieces_of_the_bank_are_one_bank() -> None:
+    found = contacts((10.0, "bank_0"), (14.0, "bank_1"), (30.0, "bank_0"))
+    assert [each[:2] for each in found] == [(BANK, 10.0), (BANK, 30.0)]
+
+
+def test_a_contact_with_what_was_before_the_camera_is_visible_and_with_what_was_behind_it_is_not() -> None:
+    assert [each[2] for each in contacts((10.0, "buoy"), (40.0, "buoy"))] == [True, False]
 
 
 def test_encounters_have_one_closest_point_each() -> None:

@@ -67,7 +67,8 @@ def test_parsing_a_case_inverts_its_name() -> None:
 
 @pytest.mark.parametrize(
     ("text", "says"),
-    [("sea:1:paani", "no world 'sea'"), ("lake:x:paani", "'x' is no seed"), ("lake:1:me", "no policy 'me'"),
+    [("sea:1:paani", "no world 'sea'"), ("lake:x:paani", "'x' is no seed"), (f"lake:{'9' * 5000}:paani", "is no seed"),
+     ("lake:1:me", "no policy 'me'"),
      ("lake+rain:1:paani", "no fault 'rain'"), ("lake", "no policy"), ("", "no world")],
 )  # fmt: skip
 def test_a_malformed_case_is_refused(text: str, says: str) -> None:
@@ -111,6 +112,25 @@ def test_settings_and_scenario_files_are_part_of_what_made_a_result(tmp_path: Pa
     before = reader.fingerprint(TrialCase(str(file), 1, Policy.BLIND))
     file.write_text("b")
     assert before.list_differences(reader.fingerprint(TrialCase(str(file), 1, Policy.BLIND))) == ["scenario"]
+    vessel = tmp_path / "mine.toml"
+    for name in ("settings", "scenario"):
+        file.write_text(f"[vessel]\nprofile = '{vessel}'" if name == "scenario" else "")
+        sets = ("plant.vessel=" + str(vessel),) if name == "settings" else ()
+        vessel.write_text("a")
+        made = FingerprintReader(sets).fingerprint(TrialCase(str(file), 1, Policy.BLIND))
+        vessel.write_text("b")
+        again = FingerprintReader(sets).fingerprint(TrialCase(str(file), 1, Policy.BLIND))
+        assert made.list_differences(again) == [name]
+
+
+def test_a_result_names_the_machine_that_made_it_and_files_of_one_name_have_results_of_their_own(
+    tmp_path: Path, reader: FingerprintReader
+) -> None:
+    made = reader.fingerprint(CASES[0])
+    assert made.machine
+    assert made.list_differences(msgspec.structs.replace(made, machine="")) == ["machine"]
+    one, other = (TrialCase(str(tmp_path / folder / "x.toml"), 1, Policy.BLIND) for folder in ("a", "b"))
+    assert one.stem != other.stem
 
 
 def test_stored_results_survive_their_file(tmp_path: Path, reader: FingerprintReader) -> None:
@@ -180,6 +200,8 @@ def test_figures_of_people_and_of_several_parts_say_so() -> None:
     [
         (["--worlds", "sea"], "no such world"),
         (["--scenario", "none.toml"], "none.toml"),
+        (["--scenario", "lake"], "lake: is no written scenario"),
+        (["--scenario", "random:lake:3"], "random:lake:3: is no written scenario"),
         (["--set", "navigator.cruise_mps=fast"], "cruise_mps"),
         (["--record", "a.mcap"], "--record needs --one"),
         (["--json", "/nowhere/at/all.json"], "no such folder"),

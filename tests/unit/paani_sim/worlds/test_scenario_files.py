@@ -226,6 +226,10 @@ BAD = {
         LAKE + "[route]\nwaypoints_m = [[0.0, 0.0], [9.0, 0.0], [9.0, 0.0]]\n",
         r"route\.waypoints_m\[1\] and the next",
     ),
+    "reserved name": (
+        LAKE + '[[actors]]\nid = "bank_0"\nlook = "dinghy"\npath_m = [[5.0, 5.0], [9.0, 5.0]]\nspeed_mps = 0.5\n',
+        r"actors\[0\]\.id: 'bank_0' is a name of the simulator's own",
+    ),
     "over land": (
         LAKE + "[route]\nwaypoints_m = [[0.0, 0.0], [0.0, 90.0]]\n",
         r"leg 0 runs over land",
