@@ -91,10 +91,10 @@ def _people_text(advisory: Advisory) -> str:
     if advisory.direction is Direction.STOP:
         return f"Stop: {who}, waiting. "
     is_slowed = not isinstance(advisory.speed_limit_mps, msgspec.UnsetType)
-    said = f"Slow: {who}" if is_slowed else f"{who[0].upper()}{who[1:]}"
+    opening = f"Slow: {who}" if is_slowed else f"{who[0].upper()}{who[1:]}"
     if advisory.purpose is Purpose.LOOK:
-        return f"{said}, looking for a way around. "
-    return f"{said}, passing on the {SIDE_OF.get(advisory.direction, 'side')}. "
+        return f"{opening}, looking for a way around. "
+    return f"{opening}, passing on the {SIDE_OF.get(advisory.direction, 'side')}. "
 
 
 def _counterfactual_text(advisory: Advisory, tracks: tuple[Track, ...]) -> str:

@@ -52,8 +52,8 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
                 state.put(m.SensorsState(source_us=now_us, devices=devices))
                 vessels = suite.vessels(steady_us)
                 if vessels is not None:
-                    told = tuple(_dated_fix(each, wall_time.offset_us()) for each in vessels)
-                    ais.put(m.AisVessels(source_us=now_us, vessels=told))
+                    dated = tuple(_dated_fix(each, wall_time.offset_us()) for each in vessels)
+                    ais.put(m.AisVessels(source_us=now_us, vessels=dated))
                 bus.note(_summary(devices))
                 for cause, n in (suite.drops - counted).items():
                     bus.count_drop(cause, n)

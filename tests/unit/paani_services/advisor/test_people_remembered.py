@@ -70,7 +70,7 @@ def test_no_foot_is_farther_than_where_it_is_seen(bottom: float) -> None:
 
 def test_somebody_whom_the_boat_has_turned_away_from_is_still_near() -> None:
     swimmer = box(m.Label.PERSON, (0.80, 0.6, 0.98, 0.985), 0.9)
-    state, said = AdvisorState(), []
+    state, keeps = AdvisorState(), []
     for number in range(5):
         at_us = T0_US + number * FRAME_US
         odometry = m.Odometry(
@@ -79,9 +79,9 @@ def test_somebody_whom_the_boat_has_turned_away_from_is_still_near() -> None:
         detections = (swimmer,) if number < 2 else ()
         frame = msgspec.structs.replace(ASHORE, source_us=at_us, frame_seq=number, detections=detections)
         state, advisory, _ = advise(state, frame, at_us + 50_000, CALIBRATED, odometry)
-        said.append(advisory.may_keep_station)
+        keeps.append(advisory.may_keep_station)
     assert any(track.is_out_of_view for track in state.tracker.tracks)
-    assert said == [msgspec.UNSET] * 5
+    assert keeps == [msgspec.UNSET] * 5
 
 
 @pytest.mark.parametrize("spoilt", [float("nan"), 1.5, -0.1])

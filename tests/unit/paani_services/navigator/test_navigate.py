@@ -272,8 +272,8 @@ def test_route_without_repeat_ends() -> None:
     ("changes", "inhibit"),
     [
         ({"arming": None}, Inhibit.NOT_ARMED),
-        ({"arming": Arming(source_us=1, armed=False)}, Inhibit.NOT_ARMED),
-        ({"arming": Arming(source_us=1, armed=True, stopped=True)}, Inhibit.NOT_ARMED),
+        ({"arming": Arming(source_us=NOW_US, armed=False)}, Inhibit.NOT_ARMED),
+        ({"arming": Arming(source_us=NOW_US, armed=True, stopped=True)}, Inhibit.NOT_ARMED),
         ({"arming_us": NOW_US - 1_000_001}, Inhibit.NOT_ARMED),
         ({"arming": Arming(source_us=NOW_US - 1_000_001, armed=True)}, Inhibit.NOT_ARMED),
         ({"clock": None}, Inhibit.NO_CLOCK),
