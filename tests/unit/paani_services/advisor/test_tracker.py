@@ -35,6 +35,9 @@ def test_g8_hazards_are_one_to_one() -> None:
     assert {label: HAZARDS[label].value for label in m.Label} == {
         m.Label.PERSON: "swimmer", m.Label.VESSEL: "craft", m.Label.PIER: "structure", m.Label.BUOY: "marker",
     }  # fmt: skip
+    boxes = [box(label, (0.05 + 0.24 * k, 0.4, 0.20 + 0.24 * k, 0.6)) for k, label in enumerate(m.Label)]
+    _, _, tracks = play([seeing(*boxes)] * 2)
+    assert {each.label: each.hazard for each in tracks[-1].tracks} == HAZARDS
 
 
 def test_g2_greedy_overlap() -> None:
@@ -320,12 +323,13 @@ def test_i16_gap() -> None:
     assert tracks[10].tracks[0].hits == 7
 
 
-def test_i17_a_replay_measures_motion_on_its_media_time() -> None:
+@pytest.mark.parametrize("time_base", [m.TimeBase.MEDIA, m.TimeBase.FRAME_INDEX])
+def test_i17_a_replay_measures_motion_on_its_media_time(time_base: m.TimeBase) -> None:
     """I17: frames played twice as slowly as recorded keep the recorded rate; freshness stays with source_us."""
     state, tracks = AdvisorState(), m.Tracks(source_us=0, frame_seq=0, frame_epoch=0)
     for i, frame in enumerate(growing(0.3, 10)):
         replayed = msgspec.structs.replace(
-            frame, frame_seq=i, source_us=T0_US + i * 400_000, media_us=i * 200_000, time_base=m.TimeBase.MEDIA
+            frame, frame_seq=i, source_us=T0_US + i * 400_000, media_us=i * 200_000, time_base=time_base
         )
         state, _, tracks = advise(state, replayed, replayed.source_us, PAANI)
     assert tracks.tracks[0].motion_rate_per_s == pytest.approx(0.3)

@@ -144,6 +144,7 @@ def test_a_stop_is_zero_at_once_without_slew_limit() -> None:
         (command(), None, Inhibit.NO_ODOMETRY),
         (command(), odometry(healthy=False), Inhibit.UNHEALTHY_ODOMETRY),
         (command(), odometry(surge_mps=math.nan), Inhibit.UNHEALTHY_ODOMETRY),
+        (command(), odometry(yaw_rate_radps=math.nan), Inhibit.UNHEALTHY_ODOMETRY),
         (command(heading_rad=math.nan), odometry(), Inhibit.COMMAND_INVALID),
         (command(speed_mps=math.inf), odometry(), Inhibit.COMMAND_INVALID),
         (command(speed_mps=-0.1), odometry(), Inhibit.COMMAND_INVALID),

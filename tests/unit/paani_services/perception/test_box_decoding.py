@@ -112,6 +112,22 @@ def test_c10_boxes_are_cut_at_the_picture() -> None:
     assert [d.box_xyxy for d in beyond] == [pytest.approx((270 / 320, 190 / 240, 1.0, 1.0))]
 
 
+def test_c10_a_scaled_picture_between_bars_at_its_sides_gives_fractions_of_itself() -> None:
+    """C10: 640 x 600 pixels at a scale of 0.4, with 32 pixels of bar on the left and 8 at the top."""
+    transform = LetterboxTransform(0.4, 0.4, 32, 8, 640, 600)
+    found = decode_boxes(output((32 + 0.4 * 320, 8 + 0.4 * 150, 0.4 * 64, 0.4 * 120, 0.9, 0, 0, 0)), transform, RULES)
+    assert [d.box_xyxy for d in found] == [pytest.approx((288 / 640, 90 / 600, 352 / 640, 210 / 600))]
+
+
+def test_c11_scores_are_of_the_classes_by_their_names() -> None:
+    """C11: a detector of another maker has its classes in an order of its own, and some that nobody asked for."""
+    column = (160.0, 128.0, 40.0, 40.0)
+    for row, label in ((0, Label.BUOY), (1, None), (2, Label.PERSON)):
+        scores = [0.9 if row == k else 0.0 for k in range(3)]
+        found = decode_boxes(output((*column, *scores, 0.0))[:, :7], SAME, RULES, ("buoy", "car", "person"))
+        assert [d.label for d in found] == [label] * (label is not None)
+
+
 @pytest.mark.parametrize(("distinct", "n"), [(255, 2), (256, 1)])
 def test_c7_the_best_256_are_suppressed(distinct: int, n: int) -> None:
     """C7: a box apart from the others is found as the 256th of the ranking, and not as the 257th."""
