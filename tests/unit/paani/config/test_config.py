@@ -38,6 +38,9 @@ def test_later_layers_win(tmp_path: Path) -> None:
         ("profile=fancy", "profile: unknown profile 'fancy'"),
         ("nonsense", "expected section.field=value"),
         ("advisor.lifetime_s=0.1", "advisor.evidence_max_age_s exceeds advisor.lifetime_s"),
+        ("navigator.max_total_turn_deg=180", "navigator.max_total_turn_deg: Expected `float` <= 170.0"),
+        ("navigator.planner.step_s=6", "navigator.planner.step_s 6.0 steps over what is as wide as the hull"),
+        ("navigator.planner.horizon_s=0.3", "navigator.planner.horizon_s 0.3 is less than two steps"),
         ("bus.router=foo", "bus: router foo: expected tcp/HOST:PORT"),
         ("bus.link=tcp/127.0.0.1:99999", "bus: link tcp/127.0.0.1:99999: expected tcp/HOST:PORT"),
         ("bus.shore=udp/127.0.0.1:7447", "bus: shore udp/127.0.0.1:7447: expected tcp/HOST:PORT"),
@@ -195,9 +198,9 @@ def test_defaults_are_valid() -> None:
 
 
 def test_what_settings_make_together_has_to_hold_whatever_their_order() -> None:
-    faster = ["navigator.cruise_mps=2.9", "controller.max_speed_mps=3.0"]
+    faster = ["navigator.cruise_mps=1.9", "controller.max_speed_mps=2.0"]
     assert load_config(sets=faster) == load_config(sets=faster[::-1])
-    with pytest.raises(UserError, match=r"^--set navigator\.cruise_mps=2\.9: navigator\.cruise_mps 2\.9 exceeds"):
+    with pytest.raises(UserError, match=r"^--set navigator\.cruise_mps=1\.9: navigator\.cruise_mps 1\.9 exceeds"):
         load_config(sets=["camera.rate_hz=4.0", faster[0], "eye.camera_forward_m=0.2"])
 
 
@@ -209,3 +212,11 @@ def test_a_configuration_keeps_the_profile_that_its_values_are_of() -> None:
 def test_what_was_the_dashboards_is_the_starts() -> None:
     recorded = encode_config(Config()).replace(b'"dashboard":{', b'"dashboard":{"arm_at_start":true,')
     assert decode_config(recorded.replace(b'"up":{"arm_at_start":false,', b'"up":{')).up.arm_at_start
+
+
+def test_a_planner_looks_as_far_as_the_boat_needs_to_stop() -> None:
+    short = ["navigator.planner.horizon_s=1.0", "navigator.planner.look_m=0.8"]
+    with pytest.raises(UserError, match=r"navigator\.planner looks 1\.4 m ahead .*: 1\.5 m \(stop_s, room_m\)"):
+        load_config(sets=short)
+    load_config(sets=[*short, "navigator.planner.use=false"])
+    load_config(sets=[short[0], "navigator.planner.look_m=0.95"])

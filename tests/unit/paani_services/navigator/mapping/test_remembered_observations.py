@@ -176,7 +176,7 @@ def test_each_side_is_remembered_as_it_was_looked_at_last(yaws_rad: list[float],
 
 def test_the_newest_old_pictures_are_kept_of_a_boat_that_goes_on() -> None:
     memory, edge = ObservationMemory(), water_edge_of(AT_REST)
-    for number in range(150):
+    for number in range(240):
         memory = observe_from(BoatPose(0.24 * number, 0.0, 0.0), edge, START_US + number * 400_000, memory)
     newest_us = memory.observations[-1].stamp_us
     old_us = newest_us - round(PLANNER.occupied_s * 1e6)
