@@ -21,6 +21,7 @@ MAX_PAIRS = 1_000_000  # of a waypoint and a corner: each leg is tested against 
 MAX_RALLY = 20
 MAX_RALLY_PAIRS = 5000  # of a rally point and a corner: the way to each is tested in the moment RETURN is ordered
 MIN_AREA_M2 = 1.0  # of one area: less is a slip of the pen, not water or land
+MAX_NUMBER = 1e9  # what a message takes of a speed or a time
 MAX_DISTANCE_M = 1e6  # of a point from the map's origin; a plane is no map long before that
 
 WAYPOINT_COUNTS = {  # fewest and most of a leg
@@ -167,8 +168,8 @@ def _find_leg_fault(leg: MissionLeg, at: str) -> str:
     fault = _find_point_fault(leg.waypoints, f"{at}.waypoints")
     if fault:
         return fault
-    if not (0.0 <= leg.speed_mps < math.inf and 0.0 <= leg.duration_s < math.inf):
-        return f"{at}: speed_mps and duration_s are numbers from 0"
+    if not (0.0 <= leg.speed_mps <= MAX_NUMBER and 0.0 <= leg.duration_s <= MAX_NUMBER):
+        return f"{at}: speed_mps and duration_s are numbers from 0 to {MAX_NUMBER:g}"
     if leg.kind is LegKind.HOLD_STATION and not MIN_RADIUS_M <= leg.radius_m <= MAX_RADIUS_M:
         return f"{at}.radius_m: {leg.radius_m:g} is not in {MIN_RADIUS_M:g}..{MAX_RADIUS_M:g}"
     if leg.kind is not LegKind.FOLLOW_ROUTE:

@@ -28,6 +28,7 @@ def parse_address(address: str) -> tuple[str, int]:
         with contextlib.suppress(ValueError):
             parts = urlsplit(address)
             if parts.hostname and parts.port and not (parts.path or parts.query or parts.fragment):
+                parts.hostname.encode("idna")
                 return f"{parts.hostname}:{parts.port}", 0
     raise ValueError(f"'{address}' is no port (expected {PORT_FORMATS})")
 
@@ -53,6 +54,7 @@ def tcp_address(address: str) -> tuple[str, int]:
     with contextlib.suppress(ValueError):
         parts = urlsplit(f"//{address}")
         if parts.hostname and parts.port and address.rpartition(":")[0].strip("[]").lower() == parts.hostname:
+            parts.hostname.encode("idna")  # as whoever asks for its address will
             return parts.hostname, parts.port
     raise ValueError(f"'{address}' is no HOST:PORT")
 

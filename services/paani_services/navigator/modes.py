@@ -227,7 +227,7 @@ def _bound_speed(
     wanted_mps = abs(surge) * config.cruise_mps
     if surge > 0.0:
         wanted_mps = min(wanted_mps, speed_limit_mps(inputs.advisory))
-    return limit_speed(fence, odometry, course_rad, wanted_mps, config)
+    return limit_speed(fence, odometry, course_rad, wanted_mps, config, is_astern=surge < 0.0)
 
 
 def _is_neutral(order: OperatorOrder) -> bool:

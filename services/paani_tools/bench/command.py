@@ -50,7 +50,13 @@ def _main(argv: list[str]) -> int:
     others = installed_commands()
     if argv and argv[0] in others:
         return int(others[argv[0]].load()(argv[1:]))
-    parser = argparse.ArgumentParser(prog="paani bench", description="Measure, and print the figures side by side.")
+    if argv and not argv[0].startswith("-") and argv[0] not in BENCHES:
+        raise UserError(f"bench {argv[0]}: no such bench (have: {', '.join([*BENCHES, *others])})")
+    parser = argparse.ArgumentParser(
+        prog="paani bench",
+        description="Measure, and print the figures side by side.",
+        epilog=f"`paani bench NAME --help` says more of each of: {', '.join(others)}.",
+    )
     benches = parser.add_subparsers(dest="what", required=True, metavar=" | ".join([*BENCHES, *others]))
     chain = benches.add_parser("chain", help="the whole loop, from the picture to the thrust")
     chain.add_argument("--world", help="river or lake (default: river)")

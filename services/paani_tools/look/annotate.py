@@ -10,6 +10,7 @@ from paani.messages import Advisory, Detection, Direction, Evidence, LaneRisk
 Colour = tuple[int, int, int]
 
 WIDTH_PX, BANNER_PX, LINE_PX, MARGIN_PX = 800, 142, 24, 14
+MAX_HEIGHT_PX = 8000  # nobody looks at more, and no JPEG is higher than 65,535
 TEXT_SCALE = 0.6
 TINTS = np.array([(230, 200, 40), (40, 140, 255), (120, 50, 20)], np.float32)  # BGR: water, obstacle, sky
 TINT_SHARE = 0.32
@@ -20,11 +21,11 @@ ADVICE_COLOURS = {Direction.STRAIGHT: FREE, Direction.STOP: BLOCKED, Direction.N
 
 
 def annotate_picture(bgr: U8, mask: U8 | None, evidence: Evidence, advisory: Advisory, corridors: CorridorConfig) -> U8:
-    """The picture, 800 px wide, with mask tint, corridors, boxes, and the advice below it.
+    """The picture, 800 px wide and at most 8000 high, with mask tint, corridors, boxes, and the advice below it.
 
     bgr: uint8 [H, W, 3]. mask: uint8 classes (0 water, 1 obstacle, 2 sky) of any size, or None.
     """
-    height_px = max(1, round(bgr.shape[0] * WIDTH_PX / bgr.shape[1]))
+    height_px = min(max(1, round(bgr.shape[0] * WIDTH_PX / bgr.shape[1])), MAX_HEIGHT_PX)
     canvas = np.asarray(cv2.resize(bgr, (WIDTH_PX, height_px), interpolation=cv2.INTER_LINEAR), np.uint8)
     if mask is not None:
         classes = cv2.resize(mask, (WIDTH_PX, height_px), interpolation=cv2.INTER_NEAREST)

@@ -88,8 +88,9 @@ def main(argv: list[str]) -> int:
 
 def file_name(name: str, taken: set[str]) -> str:
     """A name for the annotated picture that no other of this run has; `clip.mp4#7` becomes `clip_000007.jpg`."""
-    stem, _, number = Path(name).name.partition("#")
-    base = Path(stem).stem + (f"_{int(number):06d}" if number else "")
+    stem, _, number = Path(name).name.rpartition("#")
+    is_frame = number.isdecimal() and bool(stem)
+    base = Path(stem).stem + f"_{int(number):06d}" if is_frame else Path(name).stem
     for attempt in itertools.count(1):
         candidate = f"{base}.jpg" if attempt == 1 else f"{base}_{attempt}.jpg"
         if candidate not in taken:

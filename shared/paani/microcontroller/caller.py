@@ -33,7 +33,7 @@ SILENT_CALLS = 4  # unanswered in a row, the microcontroller counts as silent: o
 ROUND_TRIPS = 200  # kept for the percentiles: 20 s at 10 Hz
 BABBLE_BYTES, BABBLE_PAUSE_S = 4096, 0.05  # at 115200 baud no more than 600 bytes come between two calls
 ROUTE = "paani_mcu"  # where the microcontroller reports its changes of state
-NO_ROUTE, ROUTE_TAKEN = 2, 5  # error codes of the board's router
+NO_ROUTE = 2  # error code of the board's router
 
 
 class CallError(Exception):

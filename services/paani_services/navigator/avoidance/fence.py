@@ -16,9 +16,17 @@ RETURN_SECTOR_RAD = math.radians(60.0)  # a heading this far off the nearest way
 
 
 def limit_speed(
-    fence: Fence, odometry: Odometry, heading_rad: float, speed_mps: float, config: NavigatorConfig
+    fence: Fence,
+    odometry: Odometry,
+    heading_rad: float,
+    speed_mps: float,
+    config: NavigatorConfig,
+    *,
+    is_astern: bool = False,
 ) -> float | None:
     """The speed at which the ordered heading may be sailed, or None where the boat may not move.
+
+    is_astern: whether the boat is to go there stern first.
 
     The speed is limited so that `fence_margin_m` and the stopping distance (`fence_stop_s` times the speed) fit before
     the edge along the ordered heading. A boat that would come to the edge within `fence_stop_s` at a velocity that it
@@ -30,7 +38,11 @@ def limit_speed(
     here = (odometry.x_m, odometry.y_m)
     if not is_allowed(fence, here):
         return _limit_speed_outside(fence, here, heading_rad, speed_mps, config)
-    way = (here, *_stopping_places(odometry, config), here)  # round all the water on which it may come to rest
+    way = (
+        here,
+        *_stopping_places(odometry, config, is_astern=is_astern),
+        here,
+    )  # round all the water on which it may come to rest
     if any(allowed_distance_m(fence, start, end) < math.inf for start, end in itertools.pairwise(way)):
         return None
     reach_m = config.fence_margin_m + speed_mps * config.fence_stop_s
@@ -39,9 +51,9 @@ def limit_speed(
     return min(speed_mps, allowed_mps) if allowed_mps >= min(MIN_ORDERED_SPEED_MPS, speed_mps) else None
 
 
-def _stopping_places(odometry: Odometry, config: NavigatorConfig) -> tuple[Point, ...]:
+def _stopping_places(odometry: Odometry, config: NavigatorConfig, *, is_astern: bool) -> tuple[Point, ...]:
     """Where it is after `fence_stop_s` if it turns until the next order: to starboard, not at all, to port."""
-    east_mps, north_mps = _velocity_at_next_order(odometry, config)
+    east_mps, north_mps = _velocity_at_next_order(odometry, config, is_astern=is_astern)
     turn_rad = config.planner.yaw_rate_radps / config.rate_hz
     places = []
     for angle_rad in (-turn_rad, 0.0, turn_rad):
@@ -53,18 +65,21 @@ def _stopping_places(odometry: Odometry, config: NavigatorConfig) -> tuple[Point
     return tuple(places)
 
 
-def _velocity_at_next_order(odometry: Odometry, config: NavigatorConfig) -> tuple[float, float]:
+def _velocity_at_next_order(odometry: Odometry, config: NavigatorConfig, *, is_astern: bool) -> tuple[float, float]:
     """East and north velocity that the boat may have by the next order [m/s].
 
-    Thrust drives the boat along its present heading, whatever heading is ordered, until it has turned. A velocity whose
-    direction is noise counts as its part ahead.
+    Thrust drives the boat along its present heading, or astern of it, whatever heading is ordered, until it has turned.
+    A velocity whose direction is noise counts as its part in that direction.
     """
     east_mps, north_mps = velocity_over_ground_mps(odometry)
-    gain_mps = config.planner.accel_mps2 / config.rate_hz
+    gain_mps, sense = config.planner.accel_mps2 / config.rate_hz, -1.0 if is_astern else 1.0
     if math.hypot(east_mps, north_mps) <= MIN_COURSE_SPEED_MPS:
-        east_mps, north_mps, gain_mps = 0.0, 0.0, gain_mps + max(odometry.surge_mps, 0.0)
-    ahead = (portable.cos(odometry.yaw_rad), portable.sin(odometry.yaw_rad))
-    return east_mps + gain_mps * ahead[0], north_mps + gain_mps * ahead[1]
+        east_mps, north_mps, gain_mps = 0.0, 0.0, gain_mps + max(sense * odometry.surge_mps, 0.0)
+    gain_mps *= sense
+    return (
+        east_mps + gain_mps * portable.cos(odometry.yaw_rad),
+        north_mps + gain_mps * portable.sin(odometry.yaw_rad),
+    )
 
 
 def _limit_speed_outside(

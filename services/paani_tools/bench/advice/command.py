@@ -13,6 +13,7 @@ import msgspec
 from paani.cli import add_config_arguments, config_from
 from paani.clock import stopwatch_ms
 from paani.config import Config
+from paani.errors import UserError
 from paani.option_numbers import whole_number
 from paani.option_paths import input_folder, output_file
 from paani.statistics.figure_table import FigureTable, table_text
@@ -43,6 +44,8 @@ def main(argv: list[str]) -> int:
     config = config_from(options)
     selection = PictureSelection(options.data, options.sources.split(",") if options.sources else [], None)
     pictures = by_picture(selection.samples, held_out=options.held_out)
+    if not pictures:
+        raise UserError(f"{options.data}: no annotated picture of a known source (data folders: `paani models --help`)")
     judged = tuple(judge_pictures(thin_out(pictures, options.most), options.data, config))
     table = tabulate(judged, "held-out" if options.held_out else "development", config)
     sys.stdout.write(table_text(table))

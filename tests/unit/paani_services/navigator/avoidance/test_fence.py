@@ -115,6 +115,13 @@ def test_velocity_over_ground_counts_not_the_heading() -> None:
     assert limit_speed(FENCE, at(20.0, 17.5, 0.0, surge_mps=0.6), 0.0, 0.6, PAANI) == 0.6
 
 
+@given(st.floats(1.0, 39.0), st.floats(0.0, 0.6), st.floats(0.05, 0.6))
+def test_an_edge_astern_is_kept_off_as_one_ahead(x_m: float, way_mps: float, speed_mps: float) -> None:
+    bow_first = limit_speed(FENCE, at(x_m, 4.0, math.pi, way_mps), math.pi, speed_mps, PAANI)
+    stern_first = limit_speed(FENCE, at(x_m, 4.0, 0.0, -way_mps), math.pi, speed_mps, PAANI, is_astern=True)
+    assert stern_first == (None if bow_first is None else pytest.approx(bow_first, abs=1e-9))
+
+
 def test_outside_nothing_moves_unless_fence_return_is_set() -> None:
     outside = at(42.0, 10.0)
     for heading_rad in (math.pi, 0.0, 2.0):
