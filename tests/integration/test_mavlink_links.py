@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import fcntl
 import importlib.util
 import os
@@ -86,6 +87,23 @@ async def test_noise_floods_and_deaf_stations_hold_back_nobody(spawn: Spawn, ope
         assert (await good.until("PING")).seq == 7
         good.writer.close()
         assert process.returncode is None
+
+
+async def test_stations_that_say_nothing_keep_nobody_out(spawn: Spawn) -> None:
+    """As many as may connect, over links that were lost: once the first has been silent, another takes its place."""
+    tcp = find_free_port()
+    async with spawn("mavlink", f"mavlink.tcp=127.0.0.1:{tcp}", 'mavlink.udp=""', "mavlink.max_clients=2"):
+        silent = [await Client.connect(tcp) for _ in range(2)]
+        async with asyncio.timeout(20.0):
+            while True:
+                client = await Client.connect(tcp)
+                client.send(HEARTBEAT)
+                with contextlib.suppress(AssertionError, ConnectionError):
+                    await client.until("HEARTBEAT")
+                    break
+            while await silent[0].reader.read(4096):
+                pass
+        assert client.writer.is_closing() is False
 
 
 async def test_what_falls_silent_is_told_as_unknown_and_not_again(spawn: Spawn, open_as: OpenAs) -> None:

@@ -10,7 +10,7 @@ import logging
 from collections.abc import Callable
 from typing import Any
 
-from paani.clock import Clock
+from paani.clock import Clock, steady_beside
 from paani.config import MavlinkConfig
 from paani.errors import UserError
 from paani.port_address import is_loopback, tcp_address
@@ -22,6 +22,7 @@ from paani_services.mavlink.station import Station
 LOG = logging.getLogger(__name__)
 MAX_UNREAD_BYTES = 65_536  # ten seconds of telemetry: whoever has not read it is not there
 CHUNK_BYTES = 4096
+SILENT_S = 5.0  # five heartbeats: a station that says nothing keeps no other out
 PAUSE_S = 0.1  # before the next chunk is read, after one that came too fast and was thrown away
 
 
@@ -68,7 +69,8 @@ class Endpoints:
         self._gateway, self._settings, self._signer, self._clock = gateway, settings, signer, clock
         self._link_ids = itertools.count()
         self._udp: list[UdpLink] = []
-        self._writers = set[asyncio.StreamWriter]()
+        self._steady = steady_beside(clock)
+        self._heard_us = dict[asyncio.StreamWriter, int]()  # when each connection last said something
         self._server: asyncio.Server | None = None
 
     async def open(self) -> None:
@@ -93,7 +95,7 @@ class Endpoints:
         """End every link."""
         if self._server is not None:
             self._server.close()
-        for writer in tuple(self._writers):
+        for writer in tuple(self._heard_us):
             writer.transport.abort()
         for link in self._udp:
             link.close()
@@ -101,9 +103,9 @@ class Endpoints:
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         """One connection, to its end."""
         with contextlib.closing(writer), contextlib.suppress(OSError):
-            if len(self._writers) >= self._settings.max_clients:
+            if len(self._heard_us) >= self._settings.max_clients and not self._let_silent_go():
                 return
-            self._writers.add(writer)
+            self._heard_us[writer] = self._steady.now_us()
             address = writer.get_extra_info("peername")
             unsent_bytes = writer.transport.get_write_buffer_size
             station = self._add(
@@ -112,11 +114,21 @@ class Endpoints:
             )  # fmt: skip
             try:
                 while data := await reader.read(CHUNK_BYTES):
+                    self._heard_us[writer] = self._steady.now_us()
                     if not self._gateway.receive(station, data, self._clock.now_us()):
                         await asyncio.sleep(PAUSE_S)
             finally:
                 self._gateway.remove(station)
-                self._writers.discard(writer)
+                self._heard_us.pop(writer, None)
+
+    def _let_silent_go(self) -> bool:
+        """Whether a place was made: that of who is silent for longest, whose link may be lost and nobody notice."""
+        writer, heard_us = min(self._heard_us.items(), key=lambda each: each[1])
+        if self._steady.now_us() - heard_us <= SILENT_S * 1e6:
+            return False
+        del self._heard_us[writer]
+        writer.transport.abort()
+        return True
 
     def _receive(self, station: Station, data: bytes) -> None:
         self._gateway.receive(station, data, self._clock.now_us())
