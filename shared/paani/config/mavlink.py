@@ -23,9 +23,8 @@ class MavlinkConfig(Section, frozen=True):
     udp: str = "127.0.0.1:14540,127.0.0.1:14550"  # where MAVSDK and QGroundControl listen unless told otherwise
     tcp: str = ""  # ArduPilot's is port 5760
     video: str = ""  # RTSP's is port 8554
-    max_clients: Annotated[int, msgspec.Meta(ge=1, le=16)] = (
-        4  # by TCP, and players; one more is let go at once, unless one has been silent
-    )
+    # By TCP, and players; one more is let go at once, unless one of them has been silent.
+    max_clients: Annotated[int, msgspec.Meta(ge=1, le=16)] = 4
     signing_key_file: str = ""
     # A boat that was armed from here is stopped when no station that may command has been heard for so long: five
     # heartbeats of a station, as ArduPilot's FS_GCS_TIMEOUT.
