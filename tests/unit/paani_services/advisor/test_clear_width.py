@@ -1,38 +1,55 @@
-"""Clear width is written down and decides nothing."""
+"""Clear width is written down and decides nothing, but where the planner's map knows better than a quay's box."""
 
 from __future__ import annotations
 
 import msgspec
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from paani import messages as m
-from paani.config import load_config
-from paani_services.advisor.advise import AdvisorState, advise
+from paani.config import Config
+from tests.unit.paani_services.advisor.advisor_evidence import CALIBRATED, CLEAR, PAANI, PAPER, box, play
 
-CONFIG = load_config()
 SHARE = st.floats(0.0, 1.0)
 LANE = st.builds(m.LaneEvidence, non_water=SHARE, uncertainty=SHARE, clear_width=SHARE)
+LANES = st.tuples(LANE, LANE, LANE)
+PIER = box(m.Label.PIER, (0.30, 0.45, 0.72, 0.80))
+VESSEL, BUOY = box(m.Label.VESSEL, (0.30, 0.45, 0.72, 0.80)), box(m.Label.BUOY, (0.45, 0.40, 0.55, 0.60))
 
 
-@given(st.tuples(LANE, LANE, LANE), st.tuples(SHARE, SHARE, SHARE))
+def advised(lanes: tuple[m.LaneEvidence, ...], detections: tuple[m.Detection, ...], config: Config) -> m.Advisory:
+    """The advice on the third of three such pictures."""
+    left, center, right = lanes
+    frame = msgspec.structs.replace(CLEAR, left=left, center=center, right=right, detections=detections)
+    return play([frame] * 3, config)[1][-1]
+
+
+@pytest.mark.parametrize(
+    ("config", "boxes"),
+    [(PAPER, (PIER, VESSEL, BUOY)), (PAANI, (PIER, VESSEL, BUOY)), (CALIBRATED, (VESSEL, BUOY))],
+    ids=["paper", "uncalibrated", "planned"],
+)
+@given(lanes=LANES, widths=st.tuples(SHARE, SHARE, SHARE), data=st.data())
 def test_e7_clear_width_never_gates(
-    lanes: tuple[m.LaneEvidence, m.LaneEvidence, m.LaneEvidence], widths: tuple[float, float, float]
+    config: Config,
+    boxes: tuple[m.Detection, ...],
+    lanes: tuple[m.LaneEvidence, ...],
+    widths: tuple[float, float, float],
+    data: st.DataObject,
 ) -> None:
-    """E7: two pictures that differ in nothing but clear width get the same advice; the advisory states the width."""
-
-    def advised(given_lanes: tuple[m.LaneEvidence, ...]) -> m.Advisory:
-        left, center, right = given_lanes
-        evidence = m.Evidence(
-            source_us=1_000_000, frame_seq=1, frame_epoch=1, width_px=320, height_px=240, usable=True,
-            left=left, center=center, right=right, navigation_eligible=True,
-            segmentation=m.SegmentationSource.LEARNED,
-        )  # fmt: skip
-        return advise(AdvisorState(), evidence, 1_100_000, CONFIG)[1]
-
+    """E7: pictures that differ in nothing but clear width get the same advice; the advisory states the width."""
+    detections = tuple(data.draw(st.lists(st.sampled_from(boxes), max_size=2, unique=True)))
     other = tuple(msgspec.structs.replace(lane, clear_width=width) for lane, width in zip(lanes, widths, strict=True))
-    one, two = advised(lanes), advised(other)
+    one, two = advised(lanes, detections, config), advised(other, detections, config)
     assert (one.direction, one.reason, one.center.risk, one.counterfactual) == (
         two.direction, two.reason, two.center.risk, two.counterfactual,
     )  # fmt: skip
     assert (two.left.clear_width, two.center.clear_width, two.right.clear_width) == widths
+
+
+def test_where_the_planner_acts_a_quay_occupies_no_lane_that_the_mask_shows_clear() -> None:
+    """Its box covers the water before a quay that runs obliquely; the map knows where the quay is."""
+    clear, half = (msgspec.structs.replace(CLEAR.center, clear_width=width) for width in (1.0, 0.5))
+    found = [advised((CLEAR.left, center, CLEAR.right), (PIER,), CALIBRATED).center for center in (clear, half)]
+    assert [lane.occupied for lane in found] == [False, True]
