@@ -121,7 +121,7 @@ CASES: list[tuple[dict[str, m.Message | None], tuple[str, ...], list[str]]] = [
     # Advice that has changed since the order is not said to be why.
     (still(NOT_ENABLED, m.Inhibit.ADVISED_STOP), (), ["STANDING", "STANDING STILL", "the advisor advises STOP"]),
     (still(NOT_ARMED, m.Inhibit.NOT_ARMED), (), ["NOT_ARMED", "NOT ARMED", "nothing else keeps the boat still"]),
-    (still(NOT_ARMED, m.Inhibit.NOT_ARMED, m.Inhibit.NO_ROUTE), (), ["NOT_ARMED", "NOT ARMED", "and no route"]),
+    (still(NOT_ARMED, m.Inhibit.NOT_ARMED, m.Inhibit.NO_ROUTE), (), ["NOT_ARMED", "NOT ARMED", "no route"]),
     # A STOP comes before all else: standing, nothing that looks like driving is said.
     (still(NOT_ARMED, m.Inhibit.NOT_ARMED, m.Inhibit.HOLDING) | {"operator/state": STOPPED}, (),
      ["STOPPED", "STOPPED", "by paani stop; arming releases it"]),

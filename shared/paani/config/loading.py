@@ -234,4 +234,5 @@ def _merge(tree: dict[str, object], layer: Mapping[str, object]) -> None:
 
 def _set_name(text: str) -> str:
     """How an error names it: whole, unless nobody would read it."""
-    return f"--set {text}" if len(text) <= MAX_SHOWN else f"--set {text[:MAX_SHOWN]}..."
+    shown = text.encode(errors="backslashreplace").decode()  # an argument may be bytes that are no text
+    return f"--set {shown}" if len(shown) <= MAX_SHOWN else f"--set {shown[:MAX_SHOWN]}..."
