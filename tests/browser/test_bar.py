@@ -137,7 +137,7 @@ CASES: list[tuple[dict[str, m.Message | None], tuple[str, ...], list[str]]] = [
       "operator/state": BY_HAND}, (), ["MANUAL", "DRIVEN BY HAND", "by the page, the advice gives no thrust ahead"]),
     (still(NOT_ENABLED, m.Inhibit.NEUTRAL, leg="manual"), (), ["MANUAL", "DRIVEN BY HAND", "the stick is in neutral"]),
     (still(NOT_ENABLED, m.Inhibit.IDLE, leg="idle"), (), ["IDLE", "IDLE", "nothing else keeps the boat still"]),
-    (still(NOT_ENABLED, m.Inhibit.IDLE, m.Inhibit.STALE_ODOMETRY), (), ["IDLE", "IDLE", "and position too old"]),
+    (still(NOT_ENABLED, m.Inhibit.IDLE, m.Inhibit.STALE_ODOMETRY), (), ["IDLE", "IDLE", "position too old"]),
     ({}, ("plant/thrust_applied",), ["UNKNOWN", "UNKNOWN", "no recent report of thrust"]),
     (still(m.ZeroCause.PULSE_LOST), ("camera/picture",), ["STANDING", "STANDING STILL", "no recent picture"]),
     (still(m.ZeroCause.ARMING_LOST) | SILENT_OPERATOR, (),

@@ -26,7 +26,7 @@ export const PAGE_TEXTS = {
 
 /** What the boat does and why, beside what the processes say. */
 export const ACTIVITY_TEXTS = {
-  wasUnderWay: "the boat was under way", stoodStill: "the boat stood still", noOrder: "no order is heard", neutral: "the stick is in neutral", and: "and",
+  wasUnderWay: "the boat was under way", stoodStill: "the boat stood still", noOrder: "no order is heard", neutral: "the stick is in neutral",
   nothingElse: "nothing else keeps the boat still", overridden: "the advice is overridden", vetoed: "the advice gives no thrust ahead", by: "by", turning: "turning",
   waitsFor: "for", noThrust: "no thrust ahead is ordered", plannedFor: "planned for",
   stoppedBy: (/** @type {string} */ who) => `by ${who}; arming releases it`,
