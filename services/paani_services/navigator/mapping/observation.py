@@ -22,7 +22,7 @@ BOX_STEPS = 512  # of the picture's width and height, in which boxes are stored
 POSE_SPACING_US = 90_000  # between two remembered poses, at least
 MAX_POSES = 14  # they span 1.2 s, which is longer than a picture takes to become evidence
 OBSERVATION_SPACING_US = 100_000  # between two remembered observations, at least
-OLD_OBSERVATIONS = 48  # kept for what is out of sight; more cost time in every plan
+OLD_OBSERVATIONS = 25  # kept for what is out of sight; more cost time in every plan
 # Pictures from within such a square, to sides within such an angle, show the same but for a seventh of their width.
 VIEW_SIZE_M, VIEW_SIZE_RAD = 1.0, math.radians(10.0)
 BOX_SPACING_US = 190_000  # between those kept for their boxes alone
