@@ -339,7 +339,7 @@ def _prune_observations(observations: tuple[Observation, ...], config: PlannerCo
 def _distinct_views(observations: tuple[Observation, ...], newest_us: int, config: PlannerConfig) -> frozenset[int]:
     """Stamps of the newest of the older pictures from each square to each side, of `OLD_OBSERVATIONS` of these.
 
-    A boat that lies still or turns on the spot so remembers each side as it last looked there, however long it lies.
+    A boat that lies still so remembers each side as it last looked there; one that turns far, the newest of them.
     """
     found: dict[tuple[int, int, int], int] = {}
     for each in reversed(observations):
