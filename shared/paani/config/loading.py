@@ -234,5 +234,5 @@ def _merge(tree: dict[str, object], layer: Mapping[str, object]) -> None:
 
 def _set_name(text: str) -> str:
     """How an error names it: whole, unless nobody would read it."""
-    shown = text.encode(errors="backslashreplace").decode()  # an argument may be bytes that are no text
-    return f"--set {shown}" if len(shown) <= MAX_SHOWN else f"--set {shown[:MAX_SHOWN]}..."
+    printable = text.encode(errors="backslashreplace").decode()  # an argument may be bytes that are no text
+    return f"--set {printable}" if len(printable) <= MAX_SHOWN else f"--set {printable[:MAX_SHOWN]}..."
