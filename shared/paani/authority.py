@@ -63,10 +63,8 @@ def ensure_credentials(config: BusConfig) -> Path:
         return Path(config.certificates)
     folder, users = credentials_folder(config), users_in(config.graph)
     try:
-        if not folder.exists() or EVERYBODY.intersection(path.name for path in folder.iterdir()) != {
-            *users,
-            USERS_FILE,
-        }:
+        known = EVERYBODY.intersection(path.name for path in folder.iterdir()) if folder.exists() else frozenset[str]()
+        if known != {*users, USERS_FILE}:
             if config.side is Side.HOST:
                 raise UserError(f"{folder}: not the board's credentials; copy there the folder that the board has made")
             _make_credentials(folder, users)

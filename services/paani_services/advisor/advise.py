@@ -145,14 +145,13 @@ def _add_people(decision: Decision, facts: FrameFacts, aside: tuple[Obstacle, ..
     aside: people whom the boat has turned away from.
     """
     limit_mps, ahead = speed_limit_mps(facts.obstacles, config), facts.lanes["center"].people
-    people = [facts.obstacles[i] for i in ahead if facts.obstacles[i].candidate is None]
+    people = [i for i in ahead if facts.obstacles[i].candidate is None]
     candidates = tuple(n for i in ahead if (n := facts.obstacles[i].candidate) is not None)
-    named = ahead if not people else [i for i in ahead if facts.obstacles[i].candidate is None]
-    distance_m = nearest_ahead_m(facts.obstacles, named)
+    distance_m = nearest_ahead_m(facts.obstacles, people or ahead)
     return msgspec.structs.replace(
         decision,
         speed_limit_mps=msgspec.UNSET if limit_mps is None else limit_mps,
-        people_ahead=tuple(person.id for person in people) if config.advisor.people.use else msgspec.UNSET,
+        people_ahead=tuple(facts.obstacles[i].id for i in people) if config.advisor.people.use else msgspec.UNSET,
         candidates_ahead=candidates or msgspec.UNSET,
         person_distance_m=msgspec.UNSET if distance_m is None else distance_m,
         may_keep_station=may_keep_station(decision.reason, (*facts.obstacles, *aside), config) or msgspec.UNSET,

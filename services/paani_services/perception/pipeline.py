@@ -23,7 +23,13 @@ from paani.messages import (
 from paani_services.perception.box_decoding import decode_boxes, decode_people
 from paani_services.perception.candidates import find_candidates, is_reflection, people_as_candidates
 from paani_services.perception.colour_segmentation import FALLBACK_CONFIDENCE, segment_by_colour
-from paani_services.perception.corridors import CorridorEvidence, classify_cells, find_water_edge, summarise_corridors
+from paani_services.perception.corridors import (
+    MASK_HW,
+    CorridorEvidence,
+    classify_cells,
+    find_water_edge,
+    summarise_corridors,
+)
 from paani_services.perception.ego_hull import compute_visible_fractions, is_own_hull
 from paani_services.perception.engine import Engine, load_network, network_path
 from paani_services.perception.fitness import load_fitness
@@ -214,7 +220,7 @@ class Perceiver:
             above = min(config.candidates.person_confidence, config.detections.threshold(Label.PERSON))
             people = decode_people(output, transform, config.detections, above, contract.classes)
         if config.ego_polygon:
-            visible_frac = self._visible_fractions_of((64, 80))
+            visible_frac = self._visible_fractions_of(MASK_HW)
             detections = tuple(d for d in detections if not is_own_hull(d.box_xyxy, visible_frac))
             people = tuple(d for d in people if not is_own_hull(d.box_xyxy, visible_frac))
         is_finite = bool(np.isfinite(output[0]).all(axis=0).any())

@@ -25,6 +25,7 @@ from paani_tools.replay.republish import RepublishOptions, RepublishResult, repl
 from paani_tools.replay.verify import ChangeReport, CheckReport, change_log, check_log
 
 ROUTER = "bus.router=tcp/127.0.0.1:7448"  # beside the live bus
+_SINCE_START = quantity("seconds since the start", with_low=True)
 LISTENING = ("bus.", "dashboard.")  # settings that matter to a republished drive
 
 
@@ -141,7 +142,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     play.add_argument(
         "--from",
-        type=quantity("seconds since the start", with_low=True),
+        type=_SINCE_START,
         default=0.0,
         metavar="S",
         dest="from_s",
@@ -149,7 +150,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     play.add_argument(
         "--to",
-        type=quantity("seconds since the start", with_low=True),
+        type=_SINCE_START,
         default=math.inf,
         metavar="S",
         dest="to_s",

@@ -56,9 +56,9 @@ class Latest(Inbox[V]):
 
     def offer(self, value: V) -> None:
         """Called on Zenoh's thread."""
-        self._note_receipt()
         self.superseded += not self._taken
         self.value, self._taken = value, False
+        self._note_receipt()  # last, so that nobody on another thread takes the one before for new
         self.newest = Input(value, self.received_us)
         self._wake()
 
@@ -85,9 +85,9 @@ class Queue(Inbox[V]):
 
     def offer(self, value: V) -> None:
         """Called on Zenoh's thread."""
-        self._note_receipt()
         self.superseded += len(self._items) == self._items.maxlen
         self._items.append(value)
+        self._note_receipt()
         self._wake()
 
     def drain(self) -> list[V]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import difflib
 import re
 import tomllib
@@ -52,16 +51,19 @@ def load_config(
             named = _known_profile(layer.pop("profile"), f"{origin}: ")
             chosen = named if profile is None else chosen
 
-    tree: dict[str, object] = {}
-    _merge(tree, {**PROFILES[chosen], "profile": chosen})
-    steps = []
-    for origin, layer in layers:
-        _merge(tree, layer)
-        steps.append((origin, copy.deepcopy(tree)))
     try:
-        return _convert(tree)
+        return _convert(_merged(chosen, layers))
     except UNDECODABLE as error:
-        raise UserError(f"{_where_begun(error, steps)}: {_with_path(str(error))}") from error
+        raise UserError(f"{_where_begun(error, chosen, layers)}: {_with_path(str(error))}") from error
+
+
+def _merged(profile: str, layers: Iterable[tuple[str, dict[str, object]]]) -> dict[str, object]:
+    """The values of the profile, with those of the layers in their place."""
+    tree: dict[str, object] = {}
+    _merge(tree, {**PROFILES[profile], "profile": profile})
+    for _, layer in layers:
+        _merge(tree, layer)
+    return tree
 
 
 def _known_profile(named: object, where: str) -> str:
@@ -70,11 +72,11 @@ def _known_profile(named: object, where: str) -> str:
     return named
 
 
-def _where_begun(error: Exception, steps: Iterable[tuple[str, dict[str, object]]]) -> str:
+def _where_begun(error: Exception, profile: str, layers: list[tuple[str, dict[str, object]]]) -> str:
     """The layer that brought the fault in: whatever the layers, only what they make together has to hold."""
-    for origin, tree in steps:
+    for number, (origin, _) in enumerate(layers, 1):
         try:
-            _convert(tree)
+            _convert(_merged(profile, layers[:number]))
         except UNDECODABLE as earlier:
             if str(earlier) == str(error):
                 return origin

@@ -23,7 +23,7 @@ DAMAGE = (McapError, zstandard.ZstdError, struct.error, ValueError, ArithmeticEr
 
 _HEAD = struct.Struct("<BQ")
 _HEAD_AND_CHANNEL = struct.Struct("<BQH")
-_MESSAGE = struct.Struct("<HIQQ")
+MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, two times; then the payload
 
 
 class Span(msgspec.Struct, frozen=True):
@@ -55,9 +55,9 @@ def messages_in(data: bytes, wanted: Container[int]) -> Iterator[tuple[int, int,
     while at + _HEAD_AND_CHANNEL.size <= end:
         opcode, length, number = read(data, at)
         start, at = at, at + _HEAD.size + length
-        if opcode == message and number in wanted and at <= end and length >= _MESSAGE.size:
-            _, sequence, log_ns, _ = _MESSAGE.unpack_from(data, start + _HEAD.size)
-            yield number, sequence, log_ns, data[start + _HEAD.size + _MESSAGE.size : at]
+        if opcode == message and number in wanted and at <= end and length >= MESSAGE.size:
+            _, sequence, log_ns, _ = MESSAGE.unpack_from(data, start + _HEAD.size)
+            yield number, sequence, log_ns, data[start + _HEAD.size + MESSAGE.size : at]
 
 
 def span_bytes(path: Path, span: Span) -> tuple[bytes, str]:

@@ -36,11 +36,10 @@ from mcap.records import (
 )
 
 from paani.errors import UserError
-from paani.logs.layout import MAGIC, PROFILE
+from paani.logs.layout import MAGIC, MESSAGE, PROFILE
 from paani.logs.locate import has_damaged_summary
 from paani.logs.scan import (
     HEAD,
-    MESSAGE,
     Damage,
     Data,
     ScannedRecord,

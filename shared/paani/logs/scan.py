@@ -14,14 +14,13 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, Header, Metadata, Schema
 from mcap.stream_reader import get_chunk_data_stream
 
-from paani.logs.layout import DAMAGE, MAGIC, MAX_CHUNK_BYTES
+from paani.logs.layout import DAMAGE, MAGIC, MAX_CHUNK_BYTES, MESSAGE
 
 HEAD = struct.Struct("<BQ")
 # In a chunk: opcode and length, two times, size, checksum, then the name of the compression.
 ZSTD_MARK, MARK_AT = b"\x04\x00\x00\x00zstd", HEAD.size + 28
 OPCODES = frozenset(opcode.value for opcode in Opcode)
 INSIDE_CHUNKS = frozenset({Opcode.SCHEMA.value, Opcode.CHANNEL.value, Opcode.MESSAGE.value})
-MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, two times; then the payload
 
 Data = bytes | mmap.mmap
 

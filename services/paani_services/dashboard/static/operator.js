@@ -80,10 +80,10 @@ export function renderOperatorState(store, open, now, isPast) {
   remaining.value = JSON.stringify(heldFrom ? findInhibits(store, now).filter((reason) => !isOfArming(reason)) : null);
   setText(byId("wheel"), describeWheel(isHeard ? operator : undefined).name);
   byId("stop").dataset.latched = String(Boolean(operator?.stopped));
-  const shown = pendingStop(now, 1000 * store.ageS("operator/state", now)) ?? (isReplay(store) ? { state: "", word: ORDER_TEXTS.readOnly, detail: ORDER_TEXTS.played } : operatorState(operator, isHeard, store.ageS("operator/state", now)));
-  state.dataset.state = shown.state;
-  setText(byId("order-word"), shown.word);
-  setText(byId("order-detail"), refusal || shown.detail);
+  const stated = pendingStop(now, 1000 * store.ageS("operator/state", now)) ?? (isReplay(store) ? { state: "", word: ORDER_TEXTS.readOnly, detail: ORDER_TEXTS.played } : operatorState(operator, isHeard, store.ageS("operator/state", now)));
+  state.dataset.state = stated.state;
+  setText(byId("order-word"), stated.word);
+  setText(byId("order-detail"), refusal || stated.detail);
 }
 
 /** While the button is held: everything that would keep the boat still when it is armed. @param {import("./inhibits.js").StopReason[] | null} reasons null: it is not held */

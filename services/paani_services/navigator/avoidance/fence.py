@@ -38,11 +38,8 @@ def limit_speed(
     here = (odometry.x_m, odometry.y_m)
     if not is_allowed(fence, here):
         return _limit_speed_outside(fence, here, heading_rad, speed_mps, config)
-    way = (
-        here,
-        *_stopping_places(odometry, config, is_astern=is_astern),
-        here,
-    )  # round all the water on which it may come to rest
+    # Round all the water on which it may come to rest.
+    way = (here, *_stopping_places(odometry, config, is_astern=is_astern), here)
     if any(allowed_distance_m(fence, start, end) < math.inf for start, end in itertools.pairwise(way)):
         return None
     reach_m = config.fence_margin_m + speed_mps * config.fence_stop_s
