@@ -136,3 +136,19 @@ async def test_a_wall_clock_that_is_set_makes_no_message_younger(monkeypatch: py
     monkeypatch.setattr(time, "monotonic_ns", lambda: later_ns)
     assert inbox.receipt_age_s() > 3500.0
     assert inbox.fresh(0.3) is None
+
+
+@pytest.mark.parametrize("kind", [Latest, Queue])
+async def test_a_receipt_is_noted_when_its_message_is_there(kind: type[Latest[str] | Queue[str]]) -> None:
+    """Another thread that sees the new time takes whatever lies there for new."""
+    found = list[object]()
+
+    class LookingClock(ManualClock):
+        def now_us(self) -> int:
+            found.append(inbox.value if isinstance(inbox, Latest) else list(inbox._items))
+            return super().now_us()
+
+    inbox: Latest[str] | Queue[str] = Latest(LookingClock()) if kind is Latest else Queue(LookingClock(), 4)
+    inbox.offer("a")
+    assert found
+    assert all(each in ("a", ["a"]) for each in found)
