@@ -69,6 +69,7 @@ def compute_thrust(
     speed_error_mps, forward, integral = _forward_thrust(state.integral, command, odometry, step_s, config)
     max_steer = config.max_steer
     if command.keeps_station:
+        forward = forward if forward * speed_error_mps > 0.0 else 0.0  # the feed-forward alone would push it on
         max_steer = min(max_steer, config.astern + forward)  # a couple, of which neither fan's part is cut
     heading_error_rad = _turn_rad(command.heading_rad, odometry, config)
     steering = clip(

@@ -34,8 +34,9 @@ class Client:
         return self._report(*self._send("GET", "/api/tune"))
 
     def ask(self, deed: str, body: object) -> Shadow:
-        """Ask to "propose", "promote" or "rollback"; the advisor's answer, which may refuse. Raises UserError."""
-        return self._report(*self._send("POST", f"/api/tune/{deed}", msgspec.json.encode(body)))
+        """Ask to "propose", "promote" or "rollback"; the advisor's report. Raises UserError, for a refusal too."""
+        status, answer = self._send("POST", f"/api/tune/{deed}", msgspec.json.encode(body))
+        return self._report(status, answer, f"{deed} refused: " if status == http.client.CONFLICT else "")
 
     def _send(self, method: str, path: str, body: bytes | None = None) -> tuple[int, bytes]:
         headers = {"Origin": self._origin, "X-Paani-Key": ensure_operator_key(self._config.bus)}
@@ -52,10 +53,10 @@ class Client:
         finally:
             connection.close()
 
-    def _report(self, status: int, body: bytes) -> Shadow:
+    def _report(self, status: int, body: bytes, what: str = "") -> Shadow:
         try:
-            if status in {http.client.OK, http.client.CONFLICT}:
+            if status == http.client.OK:
                 return msgspec.json.decode(body, type=Shadow)
-            raise UserError(f"{self._origin}: {msgspec.json.decode(body, type=Refused).error}")
+            raise UserError(f"{self._origin}: {what}{msgspec.json.decode(body, type=Refused).error}")
         except UNDECODABLE as error:
             raise UserError(f"{self._origin}: answers {status}, but is no dashboard") from error

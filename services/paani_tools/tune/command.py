@@ -12,8 +12,7 @@ from paani.cli import add_config_arguments, config_from
 from paani.config import Config, with_settings
 from paani.config.tuning import TUNABLE
 from paani.errors import UserError
-from paani.messages import Change, Shadow, TuningRefusal
-from paani.tuning_refusals import refusal_text
+from paani.messages import Change, Shadow
 from paani.undecodable import UNDECODABLE
 from paani_tools.tune.client import Client
 from paani_tools.tune.shadow_text import status_text
@@ -32,8 +31,6 @@ def main(argv: list[str]) -> int:
         shadow = client.ask("propose", {"changes": changes_from(options.settings, config)})
     else:
         shadow = client.ask(options.deed, {"proposal": options.proposal})
-    if shadow.refusal is not TuningRefusal.NONE:
-        raise UserError(f"{options.deed} refused: {refusal_text(shadow)}")
     sys.stdout.write(_json(shadow) if options.json else status_text(shadow, config.advisor))
     return 0
 

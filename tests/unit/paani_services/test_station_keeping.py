@@ -6,7 +6,7 @@ import math
 
 import msgspec
 import pytest
-from hypothesis import assume, given
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from paani import messages as m
@@ -316,6 +316,7 @@ FAN, PART = st.floats(-CONTROLLER.astern, 1.0), st.floats(-CONTROLLER.max_integr
 
 
 @pytest.mark.parametrize("config", [CONTROLLER, ONLY_PUSHING])
+@example(0.0, 0.0, 0.0, -0.15625, 0.0, 0.0, 0.125)  # too fast by less than the drag at the speed that is ordered
 @given(
     FAN, FAN, PART, st.floats(-1.5, 1.5), st.floats(-math.pi, math.pi), st.floats(-2.0, 2.0),
     st.just(0.0) | st.floats(0.0, m.STATION_ASTERN_MPS),
