@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from paani_services.navigator.avoidance.clearance import (
+    APPROACH_S,
     UNSEEN_GROWTH_MPS,
     DynamicClearance,
+    closest_point_of_approach,
     predict_clearances,
     predicted_clearance_m,
 )
@@ -64,3 +67,24 @@ def test_one_prediction_holds_for_candidates_and_for_a_boat_that_coasts_or_rests
     assert (predicted.resting_m[count:] == predicted.resting_m[count - 1]).all()
     alone_m = predicted_clearance_m(obstacle, candidates.x_m, candidates.y_m, time_s)
     assert np.array_equal(predicted.candidates_m, alone_m)
+
+
+@given(
+    place=st.tuples(st.floats(-15.0, 15.0), st.floats(-15.0, 15.0)),
+    velocity=st.tuples(st.floats(-1.5, 1.5), st.floats(-1.5, 1.5)),
+    yaw_rad=st.floats(-3.1, 3.1),
+    way=st.tuples(st.floats(0.0, 0.8), st.floats(-0.5, 0.5)),
+)
+def test_the_closest_point_is_that_of_two_that_sail_on(
+    place: tuple[float, float], velocity: tuple[float, float], yaw_rad: float, way: tuple[float, float]
+) -> None:
+    """Surge along the heading and sway to port of it, against the distance at each of many times."""
+    east_m, north_m = (np.array([each_m]) for each_m in place)
+    point = DynamicObstacle(east_m, north_m, 0.2, Velocity(*velocity, 0.0), 0.0, frozenset())
+    found = closest_point_of_approach(point, BoatState(1.0, -2.0, yaw_rad, way[0], 0.0, way[1]))
+    time_s = np.linspace(0.0, APPROACH_S, 3001)
+    over_ground = complex(*velocity) - complex(*way) * np.exp(1j * yaw_rad)
+    gap_m = np.abs(complex(*place) - complex(1.0, -2.0) + over_ground * time_s)
+    assert found.now_m == pytest.approx(gap_m[0])
+    assert found.cpa_m == pytest.approx(gap_m.min(), abs=0.05)
+    assert found.cpa_m <= gap_m.min() + 1e-9

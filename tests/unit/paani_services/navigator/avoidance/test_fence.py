@@ -122,6 +122,20 @@ def test_an_edge_astern_is_kept_off_as_one_ahead(x_m: float, way_mps: float, spe
     assert stern_first == (None if bow_first is None else pytest.approx(bow_first, abs=1e-9))
 
 
+@pytest.mark.parametrize("is_astern", [False, True])
+@pytest.mark.parametrize("noise_mps", [0.04, 0.099])
+def test_noise_away_from_the_edge_is_no_way_off_it(noise_mps: float, *, is_astern: bool) -> None:
+    """Too slow for a course: nearer the edge it counts, farther from it does not."""
+    sense = -1.0 if is_astern else 1.0
+    edges = (0.1, 4.0, -1.0) if is_astern else (39.9, 4.0, 1.0)
+    allowed = []
+    for way_mps in (-noise_mps, 0.0, noise_mps):
+        places = (at(edges[0] - edges[2] * step * 0.02, 4.0, 0.0, sense * way_mps) for step in range(60))
+        orders = [limit_speed(FENCE, place, math.pi / 2.0, 0.3, PAANI, is_astern=is_astern) for place in places]
+        allowed.append(sum(order is not None for order in orders))
+    assert allowed[0] == allowed[1] > allowed[2] > 0
+
+
 def test_outside_nothing_moves_unless_fence_return_is_set() -> None:
     outside = at(42.0, 10.0)
     for heading_rad in (math.pi, 0.0, 2.0):

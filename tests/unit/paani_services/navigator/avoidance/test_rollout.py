@@ -43,6 +43,17 @@ def test_sway_continues_while_the_boat_turns() -> None:
     assert (carried.travelled_m == still.travelled_m).all()
 
 
+@pytest.mark.parametrize("surge_mps", [-0.02, -0.5])
+def test_way_astern_is_not_counted_as_room_ahead(surge_mps: float) -> None:
+    """A boat that still goes astern is rolled out as one at rest, which comes farther ahead by any time."""
+    astern, resting = (
+        roll_out(BoatState(0.0, 0.0, 0.3, way_mps), np.array([0.4]), np.array([0.6]), PLANNER)
+        for way_mps in (surge_mps, 0.0)
+    )
+    assert (astern.travelled_m == resting.travelled_m).all()
+    assert (astern.x_m == resting.x_m).all()
+
+
 def test_a_boat_coasts_as_far_as_its_drag_lets_it() -> None:
     """0.1 m/s of 0.6 may be wind and goes on; the drag of K5 takes the rest within 0.78 m; sway goes on."""
     time_s = np.linspace(0.0, 20.0, 201)

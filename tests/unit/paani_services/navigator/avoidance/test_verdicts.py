@@ -12,9 +12,11 @@ from hypothesis import strategies as st
 
 from paani.geometry import wrap_rad
 from paani.messages import Constraint, HeadingVerdict
+from paani_services.navigator.avoidance.constraints import hard_constraints
 from paani_services.navigator.avoidance.planner import judge_candidates
 from paani_services.navigator.avoidance.rollout import BoatState, GuidanceSetpoint, Plan
 from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle
+from paani_services.navigator.mapping.observed_cells import CELL_M
 from paani_services.navigator.mapping.occupancy_grid import GRID_CELLS, OccupancyGrid
 from paani_services.navigator.mapping.velocity_fit import Velocity
 from tests.synthetic_water import PLANNER, explain_motion, pool, request_on
@@ -128,6 +130,19 @@ def test_water_that_is_not_known_refuses_a_boat_that_could_not_stop() -> None:
     """No picture shows what lies abeam; a boat that may pivot there does not go there at speed."""
     _, verdicts = explain_motion(pool()._replace(blind_zone=wall(range(0), range(0))), CRUISING, AHEAD, None, PLANNER)
     assert {each.refused_by for each in verdicts} == {(Constraint.UNKNOWN_WATER,) * 3}
+
+
+@pytest.mark.parametrize(("surge_mps", "is_refused"), [(0.6, True), (0.3, False)])
+def test_a_slow_order_stops_no_boat_sooner_than_its_way_allows(surge_mps: float, *, is_refused: bool) -> None:
+    """The hull reaches unknown water 1.1 m ahead: a boat at 0.6 m/s stops within 1.5 m, one at 0.3 within 0.75 m."""
+    ends = wall(columns=range(round((10.0 + 1.1 + PLANNER.hull_radius_m) / CELL_M), GRID_CELLS))
+    water = basin(wall(range(0)))._replace(free=~ends)
+    judged = judge_candidates(request_on(water, BoatState(0.0, 0.0, 0.0, surge_mps), AHEAD))
+    assert judged is not None
+    ahead = np.flatnonzero(judged.evaluation.offsets_rad == 0.0)
+    assert judged.evaluation.speeds_mps[ahead].tolist() == pytest.approx([0.6, 0.3, 0.06])
+    refused = hard_constraints(judged.evaluation)[Constraint.UNKNOWN_WATER][ahead]
+    assert refused.tolist() == [True, is_refused, is_refused]
 
 
 def test_a_wall_refuses_what_leads_to_it_and_a_boat_beside_it_goes_slowly() -> None:
