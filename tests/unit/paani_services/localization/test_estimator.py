@@ -2,13 +2,14 @@
 
 import math
 import statistics
+from collections import deque
 
 import msgspec
 import pytest
 
 from paani.config import LocalizationConfig
 from paani.geometry import geodetic_from_enu
-from paani.messages import ImuSample
+from paani.messages import GpsFix, ImuSample
 from paani_services.localization.gyro_bias import UNCALIBRATED_STD_RADPS, estimate_gyro_bias
 from tests.unit.paani_services.localization.estimated_boat import BIAS_RADPS, ORIGIN_DEG, EstimatedBoat
 
@@ -167,6 +168,70 @@ def test_a12_a_compass_that_falls_silent_ends_health(boat: EstimatedBoat) -> Non
     estimates = boat.sail(5.0, surge_mps=0.6)
     assert estimates[50].healthy
     assert not any(one.healthy for one in estimates[62:])
+
+
+@pytest.mark.parametrize("late", [0, 2, 4])
+def test_a_late_fix_says_where_the_boat_was(late: int) -> None:
+    """A receiver that hands out its fixes 0.4 or 0.8 s later shifts a boat at 1 m/s by a third of that at most.
+
+    What remains is of the way in which it gathered speed.
+    """
+    boat, fixes = EstimatedBoat(fix_noise_m=0.05), deque[GpsFix](maxlen=late + 1)
+
+    def delay(fix: GpsFix) -> GpsFix:
+        fixes.append(fix)
+        return fixes[0]
+
+    boat.change_fix = delay
+    boat.sail(25.0, surge_mps=1.0)
+    ahead_m = []
+    for _ in range(50):
+        estimate = boat.sail(0.2, surge_mps=1.0)[-1]
+        east_m, north_m = estimate.x_m - boat.x_m, estimate.y_m - boat.y_m
+        ahead_m.append(east_m * math.cos(boat.yaw_rad) + north_m * math.sin(boat.yaw_rad))
+    assert estimate.healthy
+    assert statistics.fmean(ahead_m) == pytest.approx(0.0, abs=0.05 + late * 0.2 / 3.0)
+
+
+@pytest.mark.parametrize("off_s", [-1.1, 1.1])
+def test_a_fix_from_another_time_than_the_imu_s_is_dropped_and_counted(boat: EstimatedBoat, off_s: float) -> None:
+    """Behind it or ahead of it: the position at the time of the IMU would be a guess."""
+    boat.imu = off_s < 0.0  # a fix ahead of the IMU is one whose IMU has fallen silent
+    boat.gps = False
+    boat.sail(1.3)
+    before, taken_us = boat.estimator.drops["gps_out_of_step"], boat.now_us + round(min(off_s, 0.0) * 1e6)
+    boat.estimator.step([], msgspec.structs.replace(boat.fix(), source_us=taken_us), boat.now_us)
+    assert boat.estimator.drops["gps_out_of_step"] == before + 1
+
+
+@pytest.mark.parametrize("gap_s", [1.0, 3.0])
+def test_what_the_imu_saw_before_a_gap_does_not_say_that_the_boat_lies_still_after_it(
+    boat: EstimatedBoat, gap_s: float
+) -> None:
+    """It has gathered way meanwhile, which no sample shows."""
+    boat.sail(20.0)
+    assert boat.global_estimate.stopped
+    boat.imu = False
+    boat.sail(gap_s, surge_mps=0.5)
+    boat.imu = True
+    after = [each for each in boat.sail(5.0, surge_mps=0.5) if each.healthy]
+    assert len(after) > 50
+    assert [(each.stopped, abs(each.surge_mps - 0.5) < 0.2) for each in after] == [(False, True)] * len(after)
+
+
+@pytest.mark.parametrize("gap_s", [1.0, 2.0])
+def test_a_gap_of_the_imu_widens_the_estimates_by_the_way_that_the_boat_may_have_made(
+    boat: EstimatedBoat, gap_s: float
+) -> None:
+    """At up to 0.5 m/s."""
+    boat.gps = False
+    boat.sail(0.05)
+    before_m = boat.global_estimate.position_std_m
+    boat.imu = False
+    boat.sail(gap_s)
+    boat.imu = True
+    boat.sail(0.05)
+    assert boat.global_estimate.position_std_m > 0.95 * math.hypot(before_m, 0.5 * gap_s)
 
 
 def test_first_fix_is_the_origin_when_none_is_set() -> None:

@@ -154,6 +154,15 @@ def test_q3_lifetimes() -> None:
     assert (PAPER.free_s, PAPER.occupied_s) == (PLANNER.free_s, PLANNER.occupied_s) == (0.8, 2.0)
 
 
+def test_a_picture_that_is_still_to_come_shows_nothing() -> None:
+    """As one from before the clock was set back is: its age is none."""
+    memory = observe_from(edge=water_edge_of(AT_REST, AHEAD_5_M))
+    assert cell(grid_of(memory, 0.0), 5.0, 0.0) == "occupied"
+    early = grid_of(memory, -0.001)
+    assert not early.occupied.any()
+    assert not early.free.any()
+
+
 @pytest.mark.parametrize("config", [PAPER, PLANNER])
 def test_q3_occupied_wins_for_its_lifetime(config: PlannerConfig) -> None:
     """Pictures of open water do not free a cell that one picture (Q3), or two, saw occupied less than 2 s ago."""

@@ -236,6 +236,16 @@ def test_nonsense_is_named_and_changes_no_obstacle(depth_m: float, available: bo
     assert survey.memory.cells == marked
 
 
+def test_a_sounding_that_is_still_to_come_is_named_and_marks_nothing() -> None:
+    """As one from before the clock was set back is."""
+    survey = Survey()
+    survey.sail(5, level(4.0))
+    for ahead_us in (1, 5_000_000):
+        survey.take(m.Depth(source_us=survey.now_us + STEP_US + ahead_us, depth_m=0.2))
+        assert (survey.memory.status, survey.memory.cells) == (SoundingStatus.STALE, ())
+    assert survey.sail(2, level(4.0)).status is SoundingStatus.OK
+
+
 def test_a_sonar_that_falls_silent_is_named() -> None:
     survey = Survey()
     survey.sail(10, level(3.0))
