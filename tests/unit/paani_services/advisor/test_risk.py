@@ -12,7 +12,15 @@ from hypothesis import strategies as st
 from paani import messages as m
 from paani.config import CalibrationConfig, Config, EyeConfig, RiskConfig, calibration_of, load_config
 from paani.messages import BoxXyxy
-from paani_services.advisor.risk import corridor_risk, foot_by_mask, noisy_or, overlap, range_weight, severity
+from paani_services.advisor.risk import (
+    corridor_risk,
+    foot_by_mask,
+    noisy_or,
+    overlap,
+    range_weight,
+    severity,
+    stands_ashore,
+)
 from tests.unit.paani_services.advisor.advisor_evidence import BUOY_AHEAD, CLEAR, PAANI, PAPER, box, play, seeing
 
 UNIT = st.floats(0.0, 1.0)
@@ -187,3 +195,10 @@ def test_the_mask_ends_a_thing_inside_its_box_and_only_one_that_the_side_cuts(xy
         assert min(xyxy[0], 1.0 - xyxy[2]) <= 0.01
         assert foot_by_mask(xyxy, CENTER, tuple(min(y, xyxy[1]) for y in edge)) is None  # water to above the thing
     assert foot_by_mask((0.02, xyxy[1], 0.98, xyxy[3]), CENTER, tuple(edge)) is None
+
+
+@pytest.mark.parametrize(("rows_below", "is_ashore"), [(0, False), (2, False), (3, True), (8, True)])
+def test_an_error_of_the_mask_s_edge_puts_nobody_ashore(rows_below: int, *, is_ashore: bool) -> None:
+    """The edge is seldom off by more than two of its 64 rows: who stands so near to it may be in the water."""
+    somebody = (0.48, 0.40, 0.52, 0.50)
+    assert stands_ashore(somebody, ((32 + rows_below) / 64,) * 80) is is_ashore

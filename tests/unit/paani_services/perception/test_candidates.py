@@ -14,6 +14,7 @@ from paani_services.perception.box_decoding import decode_people
 from paani_services.perception.candidates import (
     find_candidates,
     find_lone_obstacles,
+    is_large_enough,
     is_reflection,
     stands_in_water,
 )
@@ -88,6 +89,27 @@ def test_an_unsure_box_counts_where_it_stands_in_water() -> None:
     assert not stands_in_water(mask, on_shore, RULES.water_share)
     found = find_candidates(mask, SURE, VISIBLE, (person(in_water), person(on_shore)), (), RULES)
     assert [(c.kind, c.box_xyxy) for c in found] == [(CandidateKind.UNSURE_BOX, in_water)]
+
+
+@pytest.mark.parametrize(("gap", "is_in_water"), [(0, False), (2, False), (3, True)])
+def test_water_is_looked_for_three_cells_beside_and_below_a_box(gap: int, *, is_in_water: bool) -> None:
+    box, above = (40 / COLUMNS, 32 / ROWS, 44 / COLUMNS, 40 / ROWS), (SHORE_ROW + 2, 36)
+    for pier in ((above[0], 44 + gap, ROWS, 70), (above[0], 10, ROWS, 40 - gap), (40 + gap, 20, ROWS, 60)):
+        assert stands_in_water(lake(pier), box, RULES.water_share) is is_in_water
+
+
+@pytest.mark.parametrize(
+    ("box", "may_be_somebody"),
+    [
+        ((0.4, 0.79, 0.5, 0.799), True),  # farther off, somebody may be as small as that
+        ((0.4, 0.79, 0.5, 0.80), False),
+        ((0.4, 0.74, 0.5, 0.80), False),
+        ((0.4, 0.73, 0.5, 0.80), True),
+        ((0.4, 0.94, 0.5, 1.0), False),
+    ],
+)
+def test_before_the_bow_nobody_is_smaller_than_a_head(box: BoxXyxy, *, may_be_somebody: bool) -> None:
+    assert is_large_enough(box) is may_be_somebody
 
 
 def test_who_is_detected_is_no_candidate_as_well() -> None:

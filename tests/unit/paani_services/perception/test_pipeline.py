@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import shutil
 import threading
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -35,6 +36,22 @@ def perceiver(config: PerceptionConfig | None = None) -> Perceiver:
 
 def jpeg(picture: np.ndarray) -> bytes:
     return cv2.imencode(".jpg", picture)[1].tobytes()
+
+
+def seeing_somebody(score: float) -> Callable[[OnnxEngine, Any], Any]:
+    """How an engine runs whose detector is so sure of somebody in the water before the bow, and of nothing else."""
+    run = OnnxEngine.run
+
+    def run_seeing(engine: OnnxEngine, tensor: Any) -> Any:
+        output = run(engine, tensor)
+        if output.ndim == 3:  # of the detector, in pixels of its input
+            height, width = tensor.shape[2:]
+            output = np.zeros_like(output)
+            output[0, :4, 0] = (0.5 * width, 0.75 * height, 0.15 * width, 0.15 * height)
+            output[0, 4 + LABELS.index(m.Label.PERSON), 0] = score
+        return output
+
+    return run_seeing
 
 
 @pytest.mark.slow
@@ -71,22 +88,26 @@ def test_b5_evidence_of_a_picture() -> None:
 def test_somebody_whom_the_mask_does_not_show_is_a_reflection(
     monkeypatch: pytest.MonkeyPatch, profile: str | None, sets: list[str], score: float, *, is_there: bool
 ) -> None:
-    run = OnnxEngine.run
-
-    def seeing_somebody(engine: OnnxEngine, tensor: Any) -> Any:
-        output = run(engine, tensor)
-        if output.ndim == 3:  # of the detector, in pixels of its input: somebody in the water before the bow
-            height, width = tensor.shape[2:]
-            output = np.zeros_like(output)
-            output[0, :4, 0] = (0.5 * width, 0.75 * height, 0.15 * width, 0.15 * height)
-            output[0, 4 + LABELS.index(m.Label.PERSON), 0] = score
-        return output
-
-    monkeypatch.setattr(OnnxEngine, "run", seeing_somebody)
+    monkeypatch.setattr(OnnxEngine, "run", seeing_somebody(score))
     evidence, _ = perceiver(load_config(profile=profile, sets=sets).perception).perceive(river(), HEADER, 0.0)
     assert evidence.usable
     assert [each.label for each in evidence.detections] == [m.Label.PERSON] * is_there
     assert is_there or not evidence.candidates
+
+
+@pytest.mark.parametrize(("score", "is_sure"), [(0.9, True), (0.3, False)])
+@pytest.mark.parametrize(("polygon", "is_hidden"), [("[[0.3,1],[0.3,0.5],[0.7,0.5],[0.7,1]]", True), ("[]", False)])
+def test_who_is_seen_on_the_own_hull_is_neither_somebody_nor_may_be(
+    monkeypatch: pytest.MonkeyPatch, polygon: str, score: float, *, is_hidden: bool, is_sure: bool
+) -> None:
+    """The boat's own figurehead would stop it for good."""
+    monkeypatch.setattr(OnnxEngine, "run", seeing_somebody(score))
+    no_reflection = "perception.candidates.reflection_confidence=0"
+    config = load_config(sets=[f"perception.ego_polygon={polygon}", no_reflection]).perception
+    evidence, _ = perceiver(config).perceive(river(), HEADER, 0.0)
+    assert len(evidence.detections) == (is_sure and not is_hidden)
+    boxes = [each for each in evidence.candidates if each.kind is m.CandidateKind.UNSURE_BOX]
+    assert len(boxes) == (not is_sure and not is_hidden)
 
 
 def test_c15_the_threshold_is_one_setting_and_travels() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import cv2
@@ -97,6 +98,15 @@ def test_a_swimmer_near_in_the_centre_wins_over_doubt_and_over_the_view() -> Non
 )
 def test_doubt_stays_without_a_near_swimmer_in_water_that_is_sure(box: BoxXyxy, sure: float, row: int) -> None:
     assert view(below(row), UNFIT, box, sure) is UNFIT
+
+
+@pytest.mark.parametrize(("lost_rows", "cause"), [(1, NONE), (2, UNFIT)])
+def test_four_fifths_of_what_is_beside_a_swimmer_must_be_water(lost_rows: int, cause: UnusableCause) -> None:
+    """Of the five rows beside the lower half of somebody, one may be foam and no more."""
+    mask = below(20)
+    rows = slice(math.ceil(SWIMMER[3] * ROWS) - 5, math.ceil(SWIMMER[3] * ROWS) - 5 + lost_rows)
+    mask[rows, math.ceil(SWIMMER[2] * COLUMNS) :] = OBSTACLE
+    assert view(mask, UNFIT, (SWIMMER[0], 29 / ROWS, *SWIMMER[2:])) is cause
 
 
 @example(COLUMNS // 2, 1, UNFIT, True)
