@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import msgspec
+import cv2
 import numpy as np
 import pytest
 
@@ -238,6 +239,19 @@ def test_jitter_stays_within_its_gains_and_is_seeded_s5() -> None:
     assert np.array_equal(one, same)
     assert not np.array_equal(one, other)
     assert one.max() <= rgb.max() * 1.3 + 1
+
+
+def test_jitter_reaches_each_of_its_gains_and_no_more_s5() -> None:
+    """Of a colour whose three numbers are the means of what is drawn."""
+    hsv = np.full((1, 1, 3), (100, 120, 150), np.uint8)
+    colour = np.asarray(cv2.cvtColor(hsv, cv2.COLOR_HSV2RGB), np.uint8)
+    jittered = [jitter_hsv(np.random.default_rng(seed), colour, Augmentation()) for seed in range(400)]
+    drawn = np.array([cv2.cvtColor(each, cv2.COLOR_RGB2HSV)[0, 0] for each in jittered]).astype(int)
+    for level, gain, least, most in zip(
+        (100, 120, 150), (0.015, 0.5, 0.3), drawn.min(axis=0), drawn.max(axis=0), strict=True
+    ):
+        assert level * (1.0 - gain) - 2.0 <= least <= level * (1.0 - 0.9 * gain) + 1.0
+        assert level * (1.0 + 0.9 * gain) - 1.5 <= most <= level * (1.0 + gain) + 2.0
 
 
 def small_run(folder: Path, epochs: int) -> Yolo11nTraining:

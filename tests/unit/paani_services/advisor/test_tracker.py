@@ -188,11 +188,13 @@ def test_h4_h5_held_urgency_decays() -> None:
         [
             seeing(box(BUOY, (0.2, 0.4, 0.4, 0.6))),
             seeing(box(BUOY, (0.22, 0.4, 0.42, 0.6))),
-            *[CLEAR] * 5,
+            *[CLEAR] * 15,
         ]
     )
     assert tracks[6].tracks[0].urgency == pytest.approx(0.5 * math.exp(-1.0))
     assert tracks[6].tracks[0].hits == 2
+    assert tracks[15].tracks[0].urgency == pytest.approx(0.5 * math.exp(-2.8))
+    assert tracks[16].tracks == ()  # 3 s after it was seen
 
 
 def test_h6_urgency_and_the_diagnostic_stay_apart() -> None:
@@ -205,7 +207,11 @@ def test_h6_urgency_and_the_diagnostic_stay_apart() -> None:
 
 @pytest.mark.parametrize(
     ("rate_per_s", "state"),
-    [(0.30, S.APPROACHING), (-0.30, S.RECEDING), (0.0, S.STEADY), (0.02, S.STEADY), (0.045, S.UNKNOWN)],
+    [
+        *[(0.30, S.APPROACHING), (0.051, S.APPROACHING), (-0.30, S.RECEDING), (-0.051, S.RECEDING)],
+        *[(0.0, S.STEADY), (0.029, S.STEADY), (-0.029, S.STEADY)],
+        *[(0.045, S.UNKNOWN), (0.031, S.UNKNOWN), (-0.031, S.UNKNOWN), (-0.045, S.UNKNOWN)],
+    ],
 )
 def test_i3_i4_states(rate_per_s: float, state: m.MotionState) -> None:
     """I1, I3, I4, U9: expansion, contraction and steady; an interval across the dead band's edge is unknown."""
