@@ -57,6 +57,15 @@ def test_a_corridor_that_is_hidden_is_blocked() -> None:
     assert lanes.left.non_water == lanes.right.non_water == 0.0
 
 
+@pytest.mark.parametrize(("visible", "is_seen"), [(0.49, False), (0.51, True), (1.0, True)])
+def test_a_corridor_of_which_less_than_half_is_seen_is_blocked(visible: float, *, is_seen: bool) -> None:
+    """However clear the water is that shows."""
+    water = np.full((HEIGHT, WIDTH), WATER, np.uint8)
+    for lane in summarise_corridors(water, SURE, CorridorConfig(), SURE * np.float32(visible)):
+        assert lane.non_water == pytest.approx(0.0 if is_seen else 1.0, abs=1e-6)
+        assert lane.clear_width == pytest.approx(1.0 if is_seen else 0.0)
+
+
 @pytest.mark.parametrize(
     ("box", "own"),
     [

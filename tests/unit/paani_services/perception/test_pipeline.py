@@ -38,8 +38,8 @@ def jpeg(picture: np.ndarray) -> bytes:
     return cv2.imencode(".jpg", picture)[1].tobytes()
 
 
-def seeing_somebody(score: float) -> Callable[[OnnxEngine, Any], Any]:
-    """How an engine runs whose detector is so sure of somebody in the water before the bow, and of nothing else."""
+def seeing_somebody(score: float, buoy: float = 0.0) -> Callable[[OnnxEngine, Any], Any]:
+    """How an engine runs whose detector is so sure of somebody in the water before the bow, or of a buoy there."""
     run = OnnxEngine.run
 
     def run_seeing(engine: OnnxEngine, tensor: Any) -> Any:
@@ -49,6 +49,7 @@ def seeing_somebody(score: float) -> Callable[[OnnxEngine, Any], Any]:
             output = np.zeros_like(output)
             output[0, :4, 0] = (0.5 * width, 0.75 * height, 0.15 * width, 0.15 * height)
             output[0, 4 + LABELS.index(m.Label.PERSON), 0] = score
+            output[0, 4 + LABELS.index(m.Label.BUOY), 0] = buoy
         return output
 
     return run_seeing
@@ -108,6 +109,19 @@ def test_who_is_seen_on_the_own_hull_is_neither_somebody_nor_may_be(
     assert len(evidence.detections) == (is_sure and not is_hidden)
     boxes = [each for each in evidence.candidates if each.kind is m.CandidateKind.UNSURE_BOX]
     assert len(boxes) == (not is_sure and not is_hidden)
+
+
+@pytest.mark.parametrize("person_confidence", [0.15, 0.9])
+def test_a_person_who_would_count_alone_may_be_one_where_something_else_counts_more(
+    monkeypatch: pytest.MonkeyPatch, person_confidence: float
+) -> None:
+    """Whatever threshold candidates have: what is sure enough of a person to be one is sure enough to be a candidate."""
+    monkeypatch.setattr(OnnxEngine, "run", seeing_somebody(0.6, buoy=0.7))
+    sets = ["reflection_confidence=0", f"person_confidence={person_confidence}"]
+    config = load_config(sets=[f"perception.candidates.{each}" for each in sets]).perception
+    evidence, _ = perceiver(config).perceive(river(), HEADER, 0.0)
+    assert [each.label for each in evidence.detections] == [m.Label.BUOY]
+    assert m.CandidateKind.UNSURE_BOX in [each.kind for each in evidence.candidates]
 
 
 def test_c15_the_threshold_is_one_setting_and_travels() -> None:
