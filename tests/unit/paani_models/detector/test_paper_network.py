@@ -3,8 +3,8 @@
 from dataclasses import replace
 from pathlib import Path
 
-import msgspec
 import cv2
+import msgspec
 import numpy as np
 import pytest
 

@@ -107,6 +107,7 @@ def test_who_is_seen_on_the_own_hull_is_neither_somebody_nor_may_be(
     config = load_config(sets=[f"perception.ego_polygon={polygon}", no_reflection]).perception
     evidence, _ = perceiver(config).perceive(river(), HEADER, 0.0)
     assert len(evidence.detections) == (is_sure and not is_hidden)
+    assert evidence.candidates is not msgspec.UNSET
     boxes = [each for each in evidence.candidates if each.kind is m.CandidateKind.UNSURE_BOX]
     assert len(boxes) == (not is_sure and not is_hidden)
 
@@ -115,12 +116,13 @@ def test_who_is_seen_on_the_own_hull_is_neither_somebody_nor_may_be(
 def test_a_person_who_would_count_alone_may_be_one_where_something_else_counts_more(
     monkeypatch: pytest.MonkeyPatch, person_confidence: float
 ) -> None:
-    """Whatever threshold candidates have: what is sure enough of a person to be one is sure enough to be a candidate."""
+    """Whatever threshold candidates have: what is sure enough of a person to be one is enough for a candidate."""
     monkeypatch.setattr(OnnxEngine, "run", seeing_somebody(0.6, buoy=0.7))
     sets = ["reflection_confidence=0", f"person_confidence={person_confidence}"]
     config = load_config(sets=[f"perception.candidates.{each}" for each in sets]).perception
     evidence, _ = perceiver(config).perceive(river(), HEADER, 0.0)
     assert [each.label for each in evidence.detections] == [m.Label.BUOY]
+    assert evidence.candidates is not msgspec.UNSET
     assert m.CandidateKind.UNSURE_BOX in [each.kind for each in evidence.candidates]
 
 
