@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import errno
+import io
 import os
 import sys
 from importlib.metadata import EntryPoint, entry_points
@@ -18,6 +19,8 @@ from paani.version import version_text
 
 def main(argv: list[str] | None = None) -> int:
     """Exit codes: 0 done, 1 crash, 2 user's mistake (one line on standard error)."""
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")  # as standard error: a name may be bytes that are no text
     arguments = sys.argv[1:] if argv is None else argv
     commands = {point.name: point for point in entry_points(group="paani.commands")}
     names = services()

@@ -113,7 +113,7 @@ def json_line(verdict: Verdict) -> str:
     advice = verdict.advisory
     lanes = (advice.left, advice.center, advice.right)
     line = JsonLine(
-        path=verdict.name,
+        path=verdict.name.encode(errors="backslashreplace").decode(),  # it may be bytes that are no text
         usable=verdict.evidence.usable,
         cause=verdict.evidence.cause,
         direction=advice.direction,

@@ -55,6 +55,18 @@ def test_json_lines(folder: Path, capsys: pytest.CaptureFixture[str], monkeypatc
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("words", [["--json"], ["--out", "annotated"]])
+def test_a_name_of_bytes_that_are_no_text_is_told_escaped(
+    tmp_path: Path, words: list[str], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    _, encoded = cv2.imencode(".png", PICTURES["black"])
+    Path("p\udcff.png").write_bytes(encoded.tobytes())
+    assert paani(["look", "p\udcff.png", *words]) == 0
+    assert r"p\udcff.png" in capsys.readouterr().out.replace("\\\\", "\\")
+
+
+@pytest.mark.slow
 def test_readable_lines_and_annotated_pictures(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
