@@ -29,7 +29,7 @@ from paani_services.navigator.avoidance.rollout import (
 ESCAPE_TOLERANCE_M = 0.2  # clearance that a way out may lose before it gains [m]: the advance of a boat while it turns
 PERSON_DISTANCE_TOLERANCE_M = 0.05  # error of an interpolated distance to a person [m]: a quarter of a cell
 MIN_PIVOT_RAD = math.radians(20.0)  # smaller pivots are not made: the boat would creep where it may wait
-HALF_FIELD_OF_VIEW_RAD = math.radians(35.0)  # what lies further off the bow is not seen; no usual lens shows less
+HALF_FIELD_OF_VIEW_RAD = math.radians(35.0)  # of the shipped lens; before what a narrower one misses, UNKNOWN_WATER
 
 Refusals = Mapping[Constraint, Bools]
 
