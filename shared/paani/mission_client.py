@@ -41,6 +41,7 @@ class MissionClient:
         self.name, self._clock = bus.user, clock
         self._requests = bus.publisher(keys.MISSION_REQUESTS[bus.user])
         self._states = bus.latest(keys.OPERATOR_STATE)
+        self._one_at_a_time = asyncio.Lock()  # the operator's process tells each client its newest answer alone
 
     async def send(
         self,
@@ -72,7 +73,7 @@ class MissionClient:
         press = secrets.randbits(32) + 1
         asked_us = 0
         try:
-            async with asyncio.timeout(timeout_s):
+            async with asyncio.timeout(timeout_s), self._one_at_a_time:
                 while (answer := self._answer_to(press)) is None:
                     now_us = self._clock.now_us()
                     if has_passed(asked_us, REPEAT_S * 1e6, now_us):

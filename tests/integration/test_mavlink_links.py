@@ -12,6 +12,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 
 from paani import keys
@@ -19,6 +20,7 @@ from paani import messages as m
 from paani.clock import WallClock
 from tests.at_work import at_work
 from tests.conftest import OpenAs, Spawn, find_free_port
+from tests.mavlink_peer import in_order
 
 common: Any = pytest.importorskip("pymavlink.dialects.v20.common", reason="needs pymavlink")
 pytestmark = pytest.mark.integration
@@ -168,6 +170,46 @@ async def test_udp_is_taken_from_its_address_alone(spawn: Spawn, open_as: OpenAs
             assert (await requests.get()).act is m.RequestAct.STOP
     station.close()
     stranger.close()
+
+
+async def test_who_leaves_while_arming_has_let_the_button_go(spawn: Spawn, open_as: OpenAs) -> None:
+    """And one order for the mission at a time: the same again is answered with it, another is refused at once."""
+    tcp, observer = find_free_port(), await open_as("observer")
+    requests, missions = observer.queue(keys.REQUESTS["mavlink"]), observer.queue(keys.MISSION_REQUESTS["mavlink"])
+    boat = in_order()
+    speakers: list[tuple[Any, Any]] = [
+        ((await open_as("operator")).publisher(keys.OPERATOR_STATE), boat.operator),
+        ((await open_as("localization")).publisher(keys.ODOMETRY), boat.odometry),
+        ((await open_as("navigator")).publisher(keys.COMMAND), boat.command),
+        ((await open_as("plant")).publisher(keys.THRUST_APPLIED), boat.applied),
+    ]
+
+    async def publish() -> None:
+        while True:
+            for publisher, message in speakers:
+                publisher.put(msgspec.structs.replace(message, source_us=CLOCK.now_us()))
+            await asyncio.sleep(0.05)
+
+    async with at_work(publish()), spawn("mavlink", f"mavlink.tcp=127.0.0.1:{tcp}", 'mavlink.udp=""'):
+        station = await Client.connect(tcp)
+        station.send(HEARTBEAT)
+        async with asyncio.timeout(10.0):
+            while not requests.drain():
+                station.send(common.MAVLink_command_long_message(1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0))
+                await asyncio.sleep(0.2)
+        for _ in range(5):
+            station.send(common.MAVLink_mission_clear_all_message(1, 1, 0))
+        station.send(common.MAVLink_mission_clear_all_message(1, 1, 1))
+        refusal = await station.until("MISSION_ACK")
+        assert (refusal.type, refusal.mission_type) == (common.MAV_MISSION_ERROR, 1)
+        async with asyncio.timeout(5.0):
+            first = await missions.get()
+        assert {request.press for request in missions.drain()} <= {first.press}
+        station.writer.transport.abort()
+        await asyncio.sleep(0.5)
+        requests.drain()
+        await asyncio.sleep(1.5)  # the press would have ended, which is what arms
+        assert requests.drain() == []
 
 
 @pytest.mark.parametrize("is_told_to_end", [True, False])

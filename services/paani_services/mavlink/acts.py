@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 from collections.abc import Awaitable, Callable
 
 from paani import messages as m
@@ -12,6 +13,7 @@ from paani.operator_client import OperatorClient
 from paani_services.mavlink.commands import (
     IN_PROGRESS,
     LATER,
+    MISSION_ERROR,
     Act,
     arm_result,
     mission_result,
@@ -21,12 +23,14 @@ from paani_services.mavlink.commands import (
 from paani_services.mavlink.gateway import Request
 from paani_services.mavlink.mission_exchange import MissionOrder
 from paani_services.mavlink.snapshot import Snapshot
-from paani_services.mavlink.station import Station
+from paani_services.mavlink.station import Source, Station
 from paani_services.mavlink.uploads import acknowledge
 
 PROGRESS_S = 0.4  # stations ask again after half a second without an answer
+LOOKS_PER_PROGRESS = 8  # whether the station that arms is still there
 STOP_TIMEOUT_S = 1.0
 SHOWN_TIMEOUT_S, SHOWN_PERIOD_S = 0.5, 0.01  # the mission in force comes by another key than the answer
+NOT_YET = "mission: the one before is not in force yet"
 MISSION_NAME = "uploaded"  # the protocol has no names
 
 
@@ -57,6 +61,7 @@ class Acts:
         self._client, self._missions, self._clock = client, missions, clock
         self._count, self._hands, self._shows = count, hands, shows
         self._changing: dict[Station, Request] = {}
+        self._orders: dict[tuple[Station, Source], MissionOrder] = {}
         self._tasks = set[asyncio.Task[None]]()
         self._arming: Request | None = None
         self._stopping: asyncio.Task[m.OperatorState | None] | None = None
@@ -80,8 +85,16 @@ class Acts:
             self._acknowledge(request, IN_PROGRESS if is_own else LATER, "")
 
     def send(self, order: MissionOrder) -> None:
-        """Begin to put a mission, a fence or rally points in force; the station is told how it ended."""
-        self._start(self._send_mission(order))
+        """Begin to put a mission, a fence or rally points in force; the station is told how it ended.
+
+        One order at a time of each who asks. The same one asked for again is answered with it.
+        """
+        under_way = self._orders.setdefault((order.station, order.target), order)
+        if under_way is order:
+            self._start(self._send_mission(order))
+        elif under_way != order:
+            self._count("mavlink_refused")
+            acknowledge(order.station, order.target, MISSION_ERROR, order.kind, self._clock.now_us(), NOT_YET)
 
     async def stop(self) -> m.OperatorState | None:
         """The state in which STOP is latched, None where nobody answers. Whoever asks meanwhile has the same answer."""
@@ -100,16 +113,27 @@ class Acts:
     async def _arm(self, request: Request) -> None:
         holding = asyncio.create_task(self._client.hold_to_arm(), name="hold")
         try:
-            while not holding.done():
-                self._acknowledge(request, IN_PROGRESS, "")
-                await asyncio.wait({holding}, timeout=PROGRESS_S)
-            self._acknowledge(request, *arm_result(holding.result()))
+            for number in itertools.count():
+                if number % LOOKS_PER_PROGRESS == 0:
+                    self._acknowledge(request, IN_PROGRESS, "")
+                await asyncio.wait({holding}, timeout=PROGRESS_S / LOOKS_PER_PROGRESS)
+                if holding.done():
+                    self._acknowledge(request, *arm_result(holding.result()))
+                    return
+                if request.hand not in self._hands():
+                    return  # who is gone holds no button
         finally:
             holding.cancel()
             self._arming = None
 
     async def _send_mission(self, order: MissionOrder) -> None:
-        answer, hand = await self._put_in_force(order), order.station.hand
+        try:
+            await self._send_and_acknowledge(order)
+        finally:
+            del self._orders[order.station, order.target]
+
+    async def _send_and_acknowledge(self, order: MissionOrder) -> None:
+        answer, hand = await self._put_in_force(order), order.station.hand_of(order.target)
         is_barred = answer is not None and answer.refusal is m.MissionRefusal.NOT_HOLDER
         if is_barred and self._is_wheel_left() and await self._client.take_wheel(hand=hand) is m.ModeRefusal.NONE:
             answer = await self._put_in_force(order)
@@ -130,7 +154,7 @@ class Acts:
     async def _put_in_force(self, order: MissionOrder) -> MissionAnswer | None:
         name = "" if order.legs is None else MISSION_NAME
         return await self._missions.send(
-            name, legs=order.legs, fence=order.fence, rally=order.rally, hand=order.station.hand
+            name, legs=order.legs, fence=order.fence, rally=order.rally, hand=order.station.hand_of(order.target)
         )
 
     def _is_wheel_left(self) -> bool:
@@ -141,7 +165,7 @@ class Acts:
     async def _turn_wheel(self, request: Request) -> None:
         try:
             if request.act is Act.WHEEL:
-                refusal = await self._client.take_wheel(hand=request.station.hand)
+                refusal = await self._client.take_wheel(hand=request.hand)
                 is_given = refusal is m.ModeRefusal.NONE
                 request.station.answer_control(request.target[0], self._clock.now_us(), is_given=is_given)
             else:
@@ -151,7 +175,7 @@ class Acts:
 
     async def _change_mode(self, request: Request) -> m.ModeRefusal | None:
         """A wheel that was left by a station that is gone is taken; from anybody else it is not."""
-        hand = request.station.hand
+        hand = request.hand
         refusal = await self._client.set_mode(request.mode, hand=hand)
         if refusal is not m.ModeRefusal.NOT_HOLDER or not self._is_wheel_left():
             return refusal

@@ -22,6 +22,8 @@ ACCEPTED, LATER = dialect.MAV_RESULT_ACCEPTED, dialect.MAV_RESULT_TEMPORARILY_RE
 DENIED, UNSUPPORTED = dialect.MAV_RESULT_DENIED, dialect.MAV_RESULT_UNSUPPORTED
 FAILED, IN_PROGRESS = dialect.MAV_RESULT_FAILED, dialect.MAV_RESULT_IN_PROGRESS
 
+MISSION_ERROR = dialect.MAV_MISSION_ERROR
+CUSTOM_MODE = dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
 ARM_DISARM = dialect.MAV_CMD_COMPONENT_ARM_DISARM
 TERMINATE = dialect.MAV_CMD_DO_FLIGHTTERMINATION
 SET_MODE = dialect.MAV_CMD_DO_SET_MODE
@@ -78,20 +80,23 @@ def judge_command(command: int, parameters: Sequence[float], snapshot: Snapshot,
     if command == ARM_DISARM:
         return _trusted(_judge_arming(first, second, snapshot), is_trusted)
     if command == SET_MODE:
-        return _trusted(judge_mode(second), is_trusted)
+        return _trusted(judge_mode(first, second), is_trusted)
     if command in MODE_COMMANDS:
-        return _trusted(judge_mode(MODE_COMMANDS[command]), is_trusted)
+        return _trusted(judge_mode(CUSTOM_MODE, MODE_COMMANDS[command]), is_trusted)
     if command == PAUSE and first in {0, 1}:
-        return _trusted(judge_mode(Mode.AUTO if first else Mode.LOITER), is_trusted)
+        return _trusted(judge_mode(CUSTOM_MODE, Mode.AUTO if first else Mode.LOITER), is_trusted)
     if command in GUIDING:
         text = NO_JUMP if command == JUMP else "refused: the boat follows its own mission"
         return _trusted(Verdict(DENIED, text), is_trusted)
     return Verdict(UNSUPPORTED)
 
 
-def judge_mode(number: int | None) -> Verdict:
-    """A mode is asked of the operator's process, whatever the base mode says beside it: no mode arms."""
-    if number is None or number not in DRIVE_MODES:
+def judge_mode(base_mode: int | None, number: int | None) -> Verdict:
+    """A mode is asked of the operator's process, whatever the base mode says beside it: no mode arms.
+
+    The number means one only where the base mode says so.
+    """
+    if base_mode is None or not base_mode & CUSTOM_MODE or number is None or number not in DRIVE_MODES:
         return Verdict(DENIED, "refused: no such mode on this boat")
     return Verdict(ACCEPTED, act=Act.MODE, mode=DRIVE_MODES[Mode(number)])
 
@@ -159,7 +164,7 @@ def _trusted(verdict: Verdict, is_trusted: bool) -> Verdict:
 def mission_result(answer: MissionAnswer | None) -> tuple[int, str]:
     """The result of a mission for MISSION_ACK, and why where it is not in force."""
     if answer is None:
-        return dialect.MAV_MISSION_ERROR, "mission: the operator's process is silent"
+        return MISSION_ERROR, "mission: the operator's process is silent"
     if answer.refusal is m.MissionRefusal.NONE:
         return dialect.MAV_MISSION_ACCEPTED, ""
     is_invalid = answer.refusal is m.MissionRefusal.INVALID

@@ -18,11 +18,12 @@ from paani_services.mavlink.log_transfers import LogTransfers
 from paani_services.mavlink.mission_exchange import MissionExchange, MissionOrder
 from paani_services.mavlink.parameter_exchange import ParameterExchange, ParameterWrite
 from paani_services.mavlink.snapshot import Snapshot
-from paani_services.mavlink.station import HAND_SILENT_S, REQUEST_CONTROL, Station
+from paani_services.mavlink.station import REQUEST_CONTROL, Source, Station, source_of
 from paani_services.mavlink.streams import MISSION_CURRENT, STREAMED
 from paani_services.mavlink.telemetry import BUILDERS
 
 AUTOPILOT_VERSION = dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION
+GROUND_STATION = dialect.MAV_TYPE_GCS
 FULL_DEFLECTION = 1000  # of a stick; a field that is not used has 0x7fff
 SEND_ONE = {  # commands that ask for one message that they name
     dialect.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: AUTOPILOT_VERSION,
@@ -36,8 +37,13 @@ class Request(NamedTuple):
     act: Act
     station: Station
     command: int
-    target: tuple[int, int]
+    target: Source
     mode: m.DriveMode = m.DriveMode.IDLE
+
+    @property
+    def hand(self) -> int:
+        """Of who asks."""
+        return self.station.hand_of(self.target)
 
 
 class Gateway:
@@ -64,14 +70,15 @@ class Gateway:
         self._ask, self._drive, self._count, self._camera = ask, drive, count, camera
         self._is_signed = is_signed
         self.stations: list[Station] = []
-        self.commander_us: int | None = None  # when a station that may command was heard last
+        self._commander: Source | None = None  # who asked for the arming, or for the wheel since
+        self.commander_us: int | None = None  # when that station was heard last
         self._snapshot = Snapshot(now_us=0)
         self.missions = MissionExchange(send, count, self._is_trusted)
         self.parameters = ParameterExchange(try_parameter, count, self._is_trusted, advisor, cruise_mps)
         self.logs = LogTransfers(count, self._is_trusted)
         self._announcer = Announcer()
         self._welcomed = set[Station]()
-        self._handlers: dict[str, Callable[[Station, Any, tuple[int, int]], None]] = {
+        self._handlers: dict[str, Callable[[Station, Any, Source], None]] = {
             "COMMAND_LONG": self._command_long,
             "COMMAND_INT": self._command_int,
             "SET_MODE": self._set_mode,
@@ -94,7 +101,7 @@ class Gateway:
         self.logs.follow(snapshot)
         for station in tuple(self.stations):
             if station.stick is not None:
-                self._drive(*station.stick, station.hand)
+                self._drive(*station.stick)
                 station.stick = None
             if not station.is_present(now_us):
                 self._welcomed.discard(station)
@@ -122,10 +129,10 @@ class Gateway:
         for _ in range(station.damaged - damaged):
             self._count("mavlink_damaged")
         for message in messages:
-            source = message.get_srcSystem(), message.get_srcComponent()
+            source = source_of(message)
             if source in {(SYSTEM, COMPONENT), (SYSTEM, CAMERA_COMPONENT)}:  # our own, come back
                 continue
-            if message.get_signed() if self._is_signed else station.is_local:
+            if self._is_heartbeat_of_commander(station, message, source):
                 self.commander_us = now_us
             handler = self._handlers.get(message.get_type())
             if self._is_addressed(message, CAMERA_COMPONENT):
@@ -148,19 +155,25 @@ class Gateway:
         component = getattr(message, "target_component", 0)
         return system in {0, SYSTEM} and component in components
 
+    def _is_heartbeat_of_commander(self, station: Station, message: Any, source: Source) -> bool:
+        """Whether who armed the boat, or has its wheel since, is there; any ground station until one has asked."""
+        if message.get_type() != "HEARTBEAT" or not self._is_trusted(station, message):
+            return False
+        return message.type == GROUND_STATION if self._commander is None else source == self._commander
+
     def _is_trusted(self, station: Station, message: Any) -> bool:
         return bool(message.get_signed()) if self._is_signed else station.is_local
 
     # What is asked
 
-    def _command_long(self, station: Station, message: Any, source: tuple[int, int]) -> None:
+    def _command_long(self, station: Station, message: Any, source: Source) -> None:
         parameters = [message.param1, message.param2, message.param3, message.param4, message.param5]
         self._command(station, message, source, parameters)
 
-    def _command_int(self, station: Station, message: Any, source: tuple[int, int]) -> None:
+    def _command_int(self, station: Station, message: Any, source: Source) -> None:
         self._command(station, message, source, [message.param1, message.param2, message.param3, message.param4])
 
-    def _command(self, station: Station, message: Any, source: tuple[int, int], parameters: Sequence[float]) -> None:
+    def _command(self, station: Station, message: Any, source: Source, parameters: Sequence[float]) -> None:
         command, now_us = message.command, self._snapshot.now_us
         first = integer(parameters[0])
         if command == dialect.MAV_CMD_REQUEST_MESSAGE or command in SEND_ONE:
@@ -181,60 +194,66 @@ class Gateway:
                 verdict = Verdict(commands.DENIED, "arm: name the boat, not everybody")
             self._answer(station, verdict, command, source)
 
-    def _set_mode(self, station: Station, message: Any, source: tuple[int, int]) -> None:
+    def _set_mode(self, station: Station, message: Any, source: Source) -> None:
         """The old way to ask for a mode; its base mode never arms."""
-        verdict = judge_mode(message.custom_mode)
+        verdict = judge_mode(message.base_mode, message.custom_mode)
         if not self._is_trusted(station, message):
             verdict = Verdict(commands.DENIED, commands.NOT_TRUSTED)
         self._answer(station, verdict, dialect.MAVLINK_MSG_ID_SET_MODE, source)
 
-    def _answer(self, station: Station, verdict: Verdict, command: int, source: tuple[int, int]) -> None:
+    def _answer(self, station: Station, verdict: Verdict, command: int, source: Source) -> None:
         if verdict.act is not None:
+            if verdict.act is Act.ARM:
+                self._follow_commander(source)
             self._ask(Request(verdict.act, station, command, source, verdict.mode))
             return
         if verdict.result != commands.ACCEPTED:
             self._count("mavlink_refused")
         station.acknowledge(command, verdict.result, source, self._snapshot.now_us, verdict.text)
 
-    def _ping(self, station: Station, message: Any, source: tuple[int, int]) -> None:
+    def _follow_commander(self, source: Source) -> None:
+        self._commander, self.commander_us = source, self._snapshot.now_us
+
+    def _ping(self, station: Station, message: Any, source: Source) -> None:
         if (message.target_system, message.target_component) == (0, 0):
             answer = dialect.MAVLink_ping_message(message.time_usec, message.seq, *source)
             station.send(answer, self._snapshot.now_us)
 
-    def _timesync(self, station: Station, message: Any, _: tuple[int, int]) -> None:
+    def _timesync(self, station: Station, message: Any, _: Source) -> None:
         if message.tc1 == 0:
             now_us = self._snapshot.now_us
             station.send(dialect.MAVLink_timesync_message(now_us * 1000, message.ts1), now_us)
 
     # Files
 
-    def _refuse_current(self, station: Station, _: Any, __: tuple[int, int]) -> None:
+    def _refuse_current(self, station: Station, _: Any, __: Source) -> None:
         """Nothing jumps. The item is told no more often than why: MAVSDK asks again whenever it hears of another."""
         self._count("mavlink_refused")
         if station.refuse(commands.NO_JUMP, self._snapshot.now_us):
             self._send_message(station, MISSION_CURRENT)
 
-    def _refuse_file(self, station: Station, message: Any, _: tuple[int, int]) -> None:
+    def _refuse_file(self, station: Station, message: Any, _: Source) -> None:
         answer = refuse_file(message)
         if answer is not None:
             station.send(answer, self._snapshot.now_us)
 
     # The wheel
 
-    def _manual_control(self, station: Station, message: Any, _: tuple[int, int]) -> None:
+    def _manual_control(self, station: Station, message: Any, source: Source) -> None:
         """As ArduRover and QGroundControl have it: z ahead, y to starboard. Silence lets the stick go."""
-        operator = self._snapshot.operator
-        is_holder = operator is not None and operator.wheel_hand == station.hand
+        operator, hand = self._snapshot.operator, station.hand_of(source)
+        is_holder = operator is not None and operator.wheel_hand == hand
         if not self._is_trusted(station, message):
             station.refuse(commands.NOT_TRUSTED, self._snapshot.now_us)
         elif operator is None or not is_holder or operator.mode is not m.DriveMode.MANUAL:
             station.refuse("refused: ask for mode MANUAL first", self._snapshot.now_us)
         elif max(abs(message.y), abs(message.z)) <= FULL_DEFLECTION:
-            station.stick = message.z / FULL_DEFLECTION, -message.y / FULL_DEFLECTION
+            station.stick = message.z / FULL_DEFLECTION, -message.y / FULL_DEFLECTION, hand
 
-    def _change_operator_control(self, station: Station, message: Any, source: tuple[int, int]) -> None:
+    def _change_operator_control(self, station: Station, message: Any, source: Source) -> None:
         """Take the wheel from whoever holds it; it is not given back to nobody."""
         if message.control_request == REQUEST_CONTROL and self._is_trusted(station, message):
+            self._follow_commander(source)
             self._ask(Request(Act.WHEEL, station, dialect.MAVLINK_MSG_ID_CHANGE_OPERATOR_CONTROL, source))
         else:
             self._count("mavlink_refused")
@@ -242,7 +261,7 @@ class Gateway:
 
     def hands(self, now_us: int) -> frozenset[int]:
         """Hands of the stations that are there."""
-        return frozenset(each.hand for each in self.stations if each.is_present(now_us, HAND_SILENT_S))
+        return frozenset[int]().union(*(each.hands(now_us) for each in self.stations))
 
     # What is sent
 

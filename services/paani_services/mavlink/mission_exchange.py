@@ -22,7 +22,7 @@ from paani_services.mavlink.mission_items import (
 )
 from paani_services.mavlink.missions import ALL, EMPTY, FENCE, MISSION, RALLY, Uploaded, plan_of
 from paani_services.mavlink.snapshot import Snapshot
-from paani_services.mavlink.station import Station
+from paani_services.mavlink.station import Source, Station
 from paani_services.mavlink.uploads import MAX_ITEMS, NO_SPACE, Completed, Uploads, acknowledge
 
 ACCEPTED, UNSUPPORTED = dialect.MAV_MISSION_ACCEPTED, dialect.MAV_MISSION_UNSUPPORTED
@@ -37,7 +37,7 @@ class MissionOrder(NamedTuple):
     """What a station asks the operator's process to put in force; None: as it is. It is acknowledged by this type."""
 
     station: Station
-    target: tuple[int, int]
+    target: Source
     kind: int
     legs: tuple[m.MissionLeg, ...] | None = None
     fence: tuple[m.FenceArea, ...] | None = None
@@ -60,7 +60,7 @@ class MissionExchange:
         self._newest: Uploaded | None = None  # which may be refused
         self._uploads, self._upload_count = Uploads(count), 0
         self._current = self._reached = self._leg_index = 0
-        self.handlers: dict[str, Callable[[Station, Any, tuple[int, int]], None]] = {
+        self.handlers: dict[str, Callable[[Station, Any, Source], None]] = {
             "MISSION_REQUEST_LIST": self._request_list,
             "MISSION_REQUEST_INT": self._request,
             "MISSION_REQUEST": self._request,
@@ -123,13 +123,13 @@ class MissionExchange:
 
     # Downloads
 
-    def _request_list(self, station: Station, message: Any, source: tuple[int, int]) -> None:
+    def _request_list(self, station: Station, message: Any, source: Source) -> None:
         if message.mission_type in {MISSION, FENCE, RALLY}:
             station.send(missions.mission_count(self._plan, message.mission_type, source), self._snapshot.now_us)
         else:
             self._refuse(station, UNSUPPORTED, message, source, "")
 
-    def _request(self, station: Station, message: Any, source: tuple[int, int]) -> None:
+    def _request(self, station: Station, message: Any, source: Source) -> None:
         kind = message.mission_type
         item = None
         if kind in {MISSION, FENCE, RALLY}:
@@ -141,7 +141,7 @@ class MissionExchange:
 
     # Uploads
 
-    def _begin(self, station: Station, message: Any, source: tuple[int, int]) -> None:
+    def _begin(self, station: Station, message: Any, source: Source) -> None:
         kind = message.mission_type
         if not self._is_trusted(station, message):
             self._refuse(station, DENIED, message, source, commands.NOT_TRUSTED)
@@ -156,7 +156,7 @@ class MissionExchange:
         else:
             self._uploads.begin(station, message, source, self._snapshot.now_us)
 
-    def _take(self, station: Station, message: Any, source: tuple[int, int]) -> None:
+    def _take(self, station: Station, message: Any, source: Source) -> None:
         whole = self._uploads.take(station, message, source, self._snapshot.now_us)
         if whole is None:
             return
@@ -191,7 +191,7 @@ class MissionExchange:
     def _keep(self, items: tuple[Item, ...], legs: Legs) -> None:
         self._newest, self._upload_count = Uploaded(items, legs), self._upload_count + 1
 
-    def _clear(self, station: Station, message: Any, source: tuple[int, int]) -> None:
+    def _clear(self, station: Station, message: Any, source: Source) -> None:
         if not self._is_trusted(station, message):
             self._refuse(station, DENIED, message, source, commands.NOT_TRUSTED)
         elif message.mission_type not in {MISSION, FENCE, RALLY, ALL}:
@@ -199,22 +199,22 @@ class MissionExchange:
         else:
             self._empty(station, message, source)
 
-    def _empty(self, station: Station, message: Any, source: tuple[int, int]) -> None:
+    def _empty(self, station: Station, message: Any, source: Source) -> None:
         kind = message.mission_type
-        self._uploads.forget(station)
+        self._uploads.cancel(station, source)
         if kind in {MISSION, ALL}:
             self._keep((), NO_LEGS)
         parts = [() if kind in {part, ALL} else None for part in (MISSION, FENCE, RALLY)]
         self._send(MissionOrder(station, source, kind, *parts))
 
-    def _end(self, station: Station, message: Any, _: tuple[int, int]) -> None:
+    def _end(self, station: Station, message: Any, source: Source) -> None:
         """A station that will not go on with its upload; after a download it is thanks."""
         if message.type != ACCEPTED:
-            self._uploads.forget(station)
+            self._uploads.cancel(station, source)
 
-    def _refuse_part(self, station: Station, message: Any, source: tuple[int, int]) -> None:
+    def _refuse_part(self, station: Station, message: Any, source: Source) -> None:
         self._refuse(station, UNSUPPORTED, message, source, NO_PARTS)
 
-    def _refuse(self, station: Station, result: int, message: Any, source: tuple[int, int], text: str) -> None:
+    def _refuse(self, station: Station, result: int, message: Any, source: Source, text: str) -> None:
         self._count("mavlink_refused")
         acknowledge(station, source, result, message.mission_type, self._snapshot.now_us, text)

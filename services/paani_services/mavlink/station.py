@@ -19,6 +19,14 @@ REQUEST_CONTROL, GIVEN, NOT_GIVEN = 0, 0, 2  # of CHANGE_OPERATOR_CONTROL and it
 PARAMETERS_PER_TICK = 5  # 250 a second
 
 
+Source = tuple[int, int]  # system and component that sent a message
+
+
+def source_of(message: Any) -> Source:
+    """Who sent a message: a link may lead to several systems."""
+    return message.get_srcSystem(), message.get_srcComponent()
+
+
 class Station:
     """`write` takes the bytes of a frame. is_local: at the loopback interface of this machine.
 
@@ -41,8 +49,9 @@ class Station:
         self.schedule = Schedule()
         self.next_parameter: int | None = None  # to be sent of the list that it asked for
         self.heard_us: int | None = None
-        self.hand = secrets.randbits(32) + 1  # by which the operator's process knows who holds the wheel
-        self.stick: tuple[float, float] | None = None  # surge and turn, to be said at the next occasion
+        self.stick: tuple[float, float, int] | None = None  # surge, turn and hand, to be said at the next occasion
+        self._hands: dict[Source, int] = {}
+        self._sources_us: dict[Source, int] = {}
         self._allowance_bytes, self._allowed_us = float(BURST_BYTES), 0
         self._texts_us: dict[str, int] = {}
 
@@ -60,9 +69,21 @@ class Station:
             return None
         self._allowance_bytes -= len(data)
         messages = self._codec.decode(data)
-        if messages:
-            self.heard_us = now_us
+        for message in messages:
+            self.heard_us = self._sources_us[source_of(message)] = now_us
         return messages
+
+    def hand_of(self, source: Source) -> int:
+        """By which the operator's process knows who holds the wheel: several may speak through one link."""
+        return self._hands.setdefault(source, secrets.randbits(32) + 1)
+
+    def hands(self, now_us: int) -> frozenset[int]:
+        """The hands of those who have spoken of late."""
+        return frozenset(
+            hand
+            for source, hand in self._hands.items()
+            if 0 <= now_us - self._sources_us.get(source, -1) <= HAND_SILENT_S * 1e6
+        )
 
     def is_present(self, now_us: int, silent_s: float = SILENT_S) -> bool:
         """Whether it has spoken of late."""
@@ -74,8 +95,10 @@ class Station:
 
     def refuse(self, text: str, now_us: int) -> bool:
         """Say why something is refused, the same thing no more than once in a while; whether it was said."""
-        said_us = self._texts_us.get(text)
-        if text and (said_us is None or has_passed(said_us, REPEAT_TEXT_S * 1e6, now_us)):
+        self._texts_us = {
+            each: us for each, us in self._texts_us.items() if not has_passed(us, REPEAT_TEXT_S * 1e6, now_us)
+        }
+        if text and text not in self._texts_us:
             self._texts_us[text] = now_us
             self.send(statustext(WARNING, text), now_us)
             return True

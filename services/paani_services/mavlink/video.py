@@ -35,9 +35,14 @@ class Player:
         self._behind_since_s: float | None = None
 
     async def send(self, data: bytes) -> None:
-        """An answer; waits while earlier ones are not read."""
+        """An answer; waits while earlier ones are not read. A player that reads none is gone: raises TimeoutError."""
         self._writer.write(data)
-        await self._writer.drain()
+        try:
+            async with asyncio.timeout(LET_GO_S):
+                await self._writer.drain()
+        except TimeoutError:
+            self.close()
+            raise
 
     def show(self, scan: Scan, source_us: int, now_s: float) -> None:
         """Send one picture, whole or not at all; a player that does not read is let go after a while."""
@@ -114,7 +119,8 @@ class Video:
                 await self._converse(player, reader)
             except (ValueError, TimeoutError):
                 self._count("video_refused")
-                await player.send(rtsp.refusal())
+                if not writer.is_closing():
+                    writer.write(rtsp.refusal())
             finally:
                 self._players.discard(player)
 

@@ -19,6 +19,7 @@ from paani_services.operator.return_place import choose_place
 DEFLECTED_MAX_S = 0.3
 NEUTRAL_MAX_S = 2.0  # a stick in neutral gives no thrust, so its hand may be silent for longer
 OVERRIDE_S = 10.0
+ANSWERS = 16  # of clients that may ask again: each does so for a second, every tenth of it
 
 
 class Facts(msgspec.Struct, frozen=True):
@@ -51,7 +52,7 @@ class Stick(msgspec.Struct, frozen=True):
 
 
 class Answer(msgspec.Struct, frozen=True):
-    """The request that was answered last, and how."""
+    """A request that was answered, and how."""
 
     client: str = ""
     press: int = 0
@@ -61,7 +62,7 @@ class Answer(msgspec.Struct, frozen=True):
 class Wheel(msgspec.Struct, frozen=True, kw_only=True):
     """`since_us`: when the mode was ordered. `by`, `hand`: who holds the wheel. `override_until_us`: 0 without one.
 
-    `override_end`: why there is none any more.
+    `override_end`: why there is none any more. `answer`: what is told now. `answers`: those that may be told again.
     """
 
     mode: DriveMode = DriveMode.ROUTE
@@ -73,6 +74,7 @@ class Wheel(msgspec.Struct, frozen=True, kw_only=True):
     override_until_us: int = 0
     override_end: OverrideEnd = OverrideEnd.NONE
     answer: Answer = Answer()
+    answers: tuple[Answer, ...] = ()
 
 
 def find_bar(mode: DriveMode, facts: Facts, *, armed: bool) -> ModeRefusal:
@@ -90,11 +92,15 @@ def find_bar(mode: DriveMode, facts: Facts, *, armed: bool) -> ModeRefusal:
 
 
 def answer(wheel: Wheel, client: str, request: m.OperatorRequest, facts: Facts, now_us: int, *, armed: bool) -> Wheel:
-    """The wheel after a request; a request that was answered is not answered again, and DRIVE has no answer."""
+    """The wheel after a request; DRIVE has no answer.
+
+    A request that is said again, as its answer gave way to that of another, is told the same and does nothing.
+    """
     if request.act is RequestAct.DRIVE:
         return drive(wheel, client, request, now_us)
-    if (client, request.press) == (wheel.answer.client, wheel.answer.press):
-        return wheel
+    for given in wheel.answers:
+        if (given.client, given.press) == (client, request.press):
+            return replace(wheel, answer=given)
     refusal = _find_refusal(wheel, client, request, facts, armed=armed)
     if refusal is ModeRefusal.NONE:
         match request.act:
@@ -105,7 +111,8 @@ def answer(wheel: Wheel, client: str, request: m.OperatorRequest, facts: Facts, 
             case RequestAct.OVERRIDE:
                 until_us = now_us + round(OVERRIDE_S * 1e6)
                 wheel = replace(wheel, override_until_us=until_us, override_end=OverrideEnd.NONE)
-    return replace(wheel, answer=Answer(client, request.press, refusal))
+    given = Answer(client, request.press, refusal)
+    return replace(wheel, answer=given, answers=(given, *wheel.answers[: ANSWERS - 1]))
 
 
 def drive(wheel: Wheel, client: str, request: m.OperatorRequest, now_us: int) -> Wheel:

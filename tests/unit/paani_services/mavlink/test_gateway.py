@@ -128,6 +128,58 @@ def test_the_base_mode_of_a_mode_never_arms() -> None:
     assert len(port.asked) == 2
 
 
+@pytest.mark.parametrize("base_mode", [0, 128, 220])
+def test_a_number_is_no_mode_where_the_base_mode_does_not_say_so(base_mode: int) -> None:
+    port, peer = made()
+    assert only(peer.send(common.MAVLink_set_mode_message(1, base_mode, 10)), "COMMAND_ACK").result == commands.DENIED
+    peer.station._texts_us.clear()
+    answers = peer.command(common.MAV_CMD_DO_SET_MODE, float(base_mode), 10.0)
+    assert only(answers, "COMMAND_ACK").result == commands.DENIED
+    assert port.asked == []
+
+
+def others(peer: Peer) -> list[bytes]:
+    """What else may come through a link, of others and of the station itself."""
+    command = common.MAVLink_command_long_message(2, 1, ARM, 0, 0, 0, 0, 0, 0, 0, 0)
+    vessel = common.MAVLink_heartbeat_message(11, 3, 0, 0, 0, 3)
+    return [
+        peer.pack(command), peer.pack(vessel, 2), peer.pack(HEARTBEAT, 254),
+        peer.pack(common.MAVLink_radio_status_message(0, 0, 0, 0, 0, 0, 0), 51),
+    ]  # fmt: skip
+
+
+def test_the_heartbeat_of_who_armed_alone_says_that_it_is_there() -> None:
+    """Not a radio, another boat, another station behind the same router, nor what the station says to others."""
+    port, peer = made()
+    peer.command(ARM, 1.0)
+    for frame in others(peer):
+        peer.send_bytes(frame, NOW_US + 1_000_000)
+    assert port.gateway.commander_us == NOW_US
+    peer.send(HEARTBEAT, NOW_US + 2_000_000)
+    assert port.gateway.commander_us == NOW_US + 2_000_000
+
+
+def test_who_takes_the_wheel_is_the_one_that_must_be_there() -> None:
+    port, peer = made()
+    peer.command(ARM, 1.0)
+    other = Peer(port.gateway, 1)
+    other.send_bytes(other.pack(common.MAVLink_change_operator_control_message(1, 0, 0, b""), 254), NOW_US)
+    peer.send(HEARTBEAT, NOW_US + 1_000_000)
+    assert port.gateway.commander_us == NOW_US
+    other.send_bytes(other.pack(HEARTBEAT, 254), NOW_US + 2_000_000)
+    assert port.gateway.commander_us == NOW_US + 2_000_000
+
+
+def test_until_somebody_has_asked_any_ground_station_will_do() -> None:
+    """As after a start of this process while the boat is armed by an earlier one."""
+    port, peer = made()
+    for frame in others(peer)[:2]:
+        peer.send_bytes(frame)
+    assert port.gateway.commander_us is None
+    peer.send_bytes(peer.pack(HEARTBEAT, 254))
+    assert port.gateway.commander_us == NOW_US
+
+
 @pytest.mark.parametrize("kind", [0, 1, 33, 42, 148])
 def test_a_message_is_sent_on_request_before_the_ack(kind: int) -> None:
     _, peer = made()

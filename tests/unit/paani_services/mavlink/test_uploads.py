@@ -209,6 +209,20 @@ def test_two_stations_upload_at_once_and_do_not_disturb_each_other() -> None:
     assert ours != theirs
 
 
+def test_two_behind_one_link_upload_at_once_and_mix_nothing() -> None:
+    port, peer = made()
+    for system in (255, 254):
+        peer.send_bytes(peer.pack(common.MAVLink_mission_count_message(1, 1, 2, MISSION), system))
+    for seq in range(2):
+        for system, place in ((255, 0), (254, 1)):
+            peer.send_bytes(peer.pack(message_of(seq, waypoint(place + seq)), system))
+    assert [(order.target, len(order.legs[0].waypoints)) for order in port.sent if order.legs] == [
+        ((255, 190), 2), ((254, 190), 2),
+    ]  # fmt: skip
+    first, second = (order.legs for order in port.sent)
+    assert first != second
+
+
 def test_too_many_items_and_what_a_stranger_sends_are_refused_at_once() -> None:
     port, peer = made()
     ack = only(peer.send(common.MAVLink_mission_count_message(1, 1, 10_201, 0)), "MISSION_ACK")

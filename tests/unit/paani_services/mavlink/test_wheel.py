@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import common
 
 from paani import messages as m
 from paani_services.mavlink.commands import Act
-from tests.mavlink_peer import HEARTBEAT, NOW_US, Peer, Port, armed, in_order, kinds
+from tests.mavlink_peer import HEARTBEAT, NOW_US, STATION, Peer, Port, armed, in_order, kinds
 
 
 def made() -> tuple[Port, Peer]:
@@ -24,7 +24,7 @@ def manual(z: int, y: int, target: int = 1) -> Any:
 def in_manual(peer: Peer, mode: m.DriveMode = m.DriveMode.MANUAL, hand: int = 0) -> Any:
     operator = m.OperatorState(
         source_us=NOW_US, armed=True, stopped=False, mode=mode, wheel_by="mavlink",
-        wheel_hand=hand or peer.station.hand,
+        wheel_hand=hand or peer.station.hand_of(STATION),
     )  # fmt: skip
     return armed(operator=operator, now_us=NOW_US + 20_000)
 
@@ -39,7 +39,7 @@ def test_the_hand_at_the_wheel_drives_in_manual() -> None:
     assert port.driven == []
     port.gateway.tick(snapshot)
     port.gateway.tick(snapshot)
-    assert port.driven == [(0.5, -0.25, peer.station.hand)]
+    assert port.driven == [(0.5, -0.25, peer.station.hand_of(STATION))]
 
 
 @pytest.mark.parametrize("stick", [(0x7FFF, 0), (0, 0x7FFF), (1001, 0), (0, -1001)])
@@ -56,7 +56,7 @@ def test_nobody_else_drives_and_nobody_in_another_mode() -> None:
     other, elsewhere = Peer(port.gateway, 1), Peer(port.gateway, 2, local=False)
     for snapshot, driver in (
         (in_manual(peer), other),
-        (in_manual(peer, hand=elsewhere.station.hand), elsewhere),
+        (in_manual(peer, hand=elsewhere.station.hand_of(STATION)), elsewhere),
         (in_manual(peer, m.DriveMode.ROUTE), peer),
         (in_manual(peer, m.DriveMode.IDLE), peer),
         (armed(operator=None), peer),
@@ -71,6 +71,17 @@ def test_nobody_else_drives_and_nobody_in_another_mode() -> None:
     peer.send(manual(500, 0, target=2))
     port.gateway.tick(in_manual(peer))
     assert port.driven == []
+
+
+def test_of_two_systems_behind_one_link_the_one_at_the_wheel_drives() -> None:
+    port, peer = made()
+    snapshot = in_manual(peer)
+    port.gateway.tick(snapshot)
+    peer.send(manual(0, 0))
+    for system in (254, 2):
+        peer.send_bytes(peer.pack(manual(1000, 0), system))
+    port.gateway.tick(snapshot)
+    assert port.driven == [(0.0, 0.0, peer.station.hand_of(STATION))]
 
 
 def test_the_wheel_is_taken_on_purpose_and_not_given_back() -> None:
@@ -88,7 +99,8 @@ def test_the_wheel_is_taken_on_purpose_and_not_given_back() -> None:
 def test_a_station_that_is_gone_has_no_hand() -> None:
     port, peer = made()
     peer.send(HEARTBEAT)
-    assert port.gateway.hands(NOW_US) == {peer.station.hand}
+    hand = peer.station.hand_of(STATION)
+    assert port.gateway.hands(NOW_US) == {hand}
     assert port.gateway.hands(NOW_US + 5_100_000) == frozenset()
     port.gateway.remove(peer.station)
     assert port.gateway.hands(NOW_US) == frozenset()

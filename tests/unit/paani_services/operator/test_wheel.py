@@ -115,6 +115,22 @@ def test_return_leads_to_a_rally_point_that_is_nearer_and_stays_with_it() -> Non
     assert bridge.mode(DriveMode.RETURN) is ModeRefusal.NO_HOME
 
 
+def test_a_request_whose_answer_gave_way_to_another_s_is_told_the_same_and_does_nothing_again() -> None:
+    """The hand that had the wheel for a moment asks again, because it never heard; it does not take it back."""
+    bridge = Bridge()
+    taken = m.OperatorRequest(source_us=1, act=RequestAct.WHEEL, press=901, hand=2)
+    bridge._tell(STATION, taken)
+    assert bridge.ask(RequestAct.WHEEL, hand=1) is ModeRefusal.NONE
+    assert bridge.mode(DriveMode.MANUAL) is ModeRefusal.NONE
+    before = bridge.wheel
+    bridge._tell(STATION, taken)
+    assert bridge.wheel.answer == w.Answer(STATION, 901, ModeRefusal.NONE)
+    assert msgspec.structs.replace(bridge.wheel, answer=before.answer) == before
+    for _ in range(3 * w.ANSWERS):
+        bridge.ask(RequestAct.OVERRIDE)
+    assert len(bridge.wheel.answers) == w.ANSWERS
+
+
 def test_a_request_that_is_said_again_is_answered_once() -> None:
     bridge = Bridge()
     request = m.OperatorRequest(source_us=1, act=RequestAct.MODE, press=9, hand=1, mode=DriveMode.HOLD)
