@@ -57,9 +57,9 @@ class AisReports:
             self._queue.put_line(data.strip())
             sentence = self._queue.get_or_none()
             report: Any = None if sentence is None else sentence.decode()  # type: ignore[attr-defined]
+            return report is not None and self._take_report(report, now_us)  # of a short one, fields are missing
         except LIBRARY_ERRORS as error:
             raise ValueError(f"AIS: {error}") from error
-        return report is not None and self._take_report(report, now_us)
 
     def vessels(self, now_us: int) -> tuple[AisVessel, ...]:
         """Those whose position was told within `MEMORY_S`, newest first, each with its size where that is known."""

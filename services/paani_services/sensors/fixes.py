@@ -21,8 +21,10 @@ RANGE_ERROR_M = 5.0
 UNKNOWN_STD_M = 10.0  # of a position without HDOP; above `LocalizationConfig.max_position_std_m`, so never healthy
 WORST_HDOP = 99.99  # receivers write this for none
 WORST_STD_M = 1e6  # u-blox receivers without a fix state 4e9 mm
+COURSELESS_MPS = 0.5  # at rest receivers leave the course empty; what moves faster has one
 MAX_KNOTS = 1e6  # what can be sent; localization judges what a boat can do
 DAY_S, WEEK_S = 86_400.0, 604_800.0
+SET_FIXES = 2  # so many in order before the time is reached again from which it was set back
 RESYNC_FIXES = 5  # so many in order after a step back in time: the receiver's clock was set, not the line disturbed
 MEASURED_MODES = frozenset({"", "A", "D", "F", "P", "R"})  # others are estimated, simulated, typed in, or not valid
 NAV_PVT = b"\x01\x07"
@@ -62,10 +64,10 @@ class FixDecoder:
         match sentence.kind:
             case "GGA":
                 hdop = sentence.number("HDOP", 0.0) if sentence.text("quality") not in {"", "0"} else None
-                self._hdop_std_m = UNKNOWN_STD_M if hdop is None else RANGE_ERROR_M * min(hdop, WORST_HDOP)
+                self._hdop_std_m = RANGE_ERROR_M * min(hdop, WORST_HDOP) if hdop else UNKNOWN_STD_M
             case "GST":
                 stds_m = [sentence.number(name, 0.0) for name in ("stdLat", "stdLong")]
-                self._std_m = max((std_m for std_m in stds_m if std_m is not None), default=None)
+                self._std_m = max((std_m for std_m in stds_m if std_m), default=None)
             case "VTG":
                 _speed_mps(sentence, "sogn"), _course_of(sentence, "cogt")
                 self._course = sentence
@@ -103,7 +105,8 @@ class FixDecoder:
             longitude_deg=pvt.lon,
             sog_mps=pvt.gSpeed * 1e-3,
             cog_rad=course_rad(pvt.headMot),
-            position_std_m=min(pvt.hAcc * 1e-3, WORST_STD_M),  # of both axes together, so no less than that of each
+            # Of both axes together, so no less than that of each. No receiver knows its position exactly.
+            position_std_m=min(pvt.hAcc * 1e-3, WORST_STD_M) if pvt.hAcc else UNKNOWN_STD_M,
             fix=is_fixed,
         )
         return self._in_order(fix, WEEK_S)
@@ -113,7 +116,8 @@ class FixDecoder:
         latitude_deg = position.angle_deg("lat", "NS", 90.0)
         longitude_deg = position.angle_deg("lon", "EW", 180.0)
         sog_mps, cog_rad = _speed_mps(course, speed_name), _course_of(course, course_name)
-        has_speed = sog_mps is not None and cog_rad is not None  # at rest receivers leave the course empty
+        has_speed = sog_mps is not None and cog_rad is not None
+        is_speed_known = sog_mps is not None and (has_speed or sog_mps <= COURSELESS_MPS)
         is_valid = position.text("status") == "A" and position.text("posMode") in MEASURED_MODES
         return GpsFix(
             source_us=round((day_s or 0.0) * 1e6),
@@ -122,7 +126,7 @@ class FixDecoder:
             sog_mps=sog_mps or 0.0 if has_speed else 0.0,
             cog_rad=cog_rad or 0.0,
             position_std_m=self._hdop_std_m if self._std_m is None else self._std_m,
-            fix=is_valid and None not in {day_s, latitude_deg, longitude_deg},
+            fix=is_valid and is_speed_known and None not in {day_s, latitude_deg, longitude_deg},
         )
 
     def _in_order(self, fix: GpsFix, span_s: float) -> GpsFix | None:
@@ -140,6 +144,7 @@ class FixDecoder:
                 self._drops["gps_late"] += 1
                 return None
             at_s = self._last_s + 1e-3
+        self.was_set = self.was_set or self._refusals_in_order >= SET_FIXES
         self._offset_s, self._last_s = at_s - time_s, at_s
         self.repeats = self._refusals_in_order = 0
         self._refused_s = -1.0

@@ -22,6 +22,7 @@ STOOD_TURN_RAD = 0.17
 # Mean specific force of a boat, whatever it does: gravity, and what waves and turns add to it. One that writes g
 # instead of m/s^2 has 1.
 LEAST_GRAVITY_MPS2, MOST_GRAVITY_MPS2 = 7.0, 13.0
+LEAST_UPRIGHT = 0.5  # of gravity, along the mast: 60 degrees of heel, mean and mount together
 GRAVITY_SAMPLES = 50  # over which it is averaged: longer than a bump
 MAX_GYRO_BIAS_RADPS = 0.1  # of an MPU6050 that nobody calibrated (its data sheet: 5 degrees a second, typically)
 
@@ -86,16 +87,22 @@ class HeadingWatch:
 
 
 class GravityWatch:
-    """Finds an inertial unit that does not feel gravity: other units than m/s^2, or a broken accelerometer."""
+    """Finds an inertial unit that does not feel gravity: other units than m/s^2, a broken accelerometer, upside down.
+
+    The sign of the gyro is known by it: a unit that stands on its head turns the wrong way.
+    """
 
     def __init__(self) -> None:
-        self._mean_mps2, self._n = 0.0, 0
+        self._mean_mps2 = self._mean_up_mps2 = 0.0
+        self._n = 0
 
     def take(self, sample: InertialSample) -> bool:
-        """Whether the mean of the force is none that a boat feels."""
+        """Whether the mean of the force is none that a boat feels, or comes from beside or above it."""
         self._n = min(self._n + 1, GRAVITY_SAMPLES)
         self._mean_mps2 += (math.hypot(*sample.accel_mps2) - self._mean_mps2) / self._n
-        return not LEAST_GRAVITY_MPS2 <= self._mean_mps2 <= MOST_GRAVITY_MPS2
+        self._mean_up_mps2 += (sample.accel_mps2[2] - self._mean_up_mps2) / self._n
+        is_gravity = LEAST_GRAVITY_MPS2 <= self._mean_mps2 <= MOST_GRAVITY_MPS2
+        return not is_gravity or self._mean_up_mps2 < LEAST_UPRIGHT * self._mean_mps2
 
 
 class TurnWatch:

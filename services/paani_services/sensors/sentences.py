@@ -16,7 +16,7 @@ from pynmeagps.nmeahelpers import calc_checksum, get_parts
 from pynmeagps.nmeatypes_get import NMEA_PAYLOADS_GET
 from pynmeagps.nmeatypes_get_prop import NMEA_PAYLOADS_GET_PROP
 
-_NUMBER = re.compile(r"[+-]?[0-9]{1,9}(\.[0-9]{0,9})?", re.ASCII)
+_NUMBER = re.compile(r"[+-]?[0-9]{1,10}(\.[0-9]{0,9})?", re.ASCII)
 _TIME = re.compile(r"[0-9]{6}(\.[0-9]{1,6})?", re.ASCII)
 _LIBRARY_ERRORS = (
     NMEAMessageError, NMEAParseError, NMEAStreamError, NMEATypeError,

@@ -36,7 +36,7 @@ HEADING_SENTENCES = frozenset({"HDT", "THS", "HDG", "HDM"})
 SAMPLE_SENTENCES = frozenset({"PQTMIMU", "VNYMR"})
 PACKET = "LDROBOT"
 MAX_KINDS, MAX_KIND = 64, 12  # kinds of frames remembered, and characters of one: a line may say anything
-NO_GRAVITY = "its acceleration is not that of gravity: does it write m/s^2? Its data are withheld"
+NO_GRAVITY = "its acceleration is not that of gravity: does it write m/s^2, and is it upright? Its data are withheld"
 LATE = "its data come over a second late: they are withheld"
 MAX_SPACING_US = 200_000  # between samples that come in one piece: no inertial unit is slower than 5 Hz
 
@@ -104,6 +104,7 @@ class SensorSuite:
                     self._fix_clock = ReceiptClock()
                 case SensorRole.IMU:
                     self._sample_watch, self._gravity_watch = SampleWatch(), GravityWatch()
+                    self._sample_clock, self._device_ms = ReceiptClock(), 0
                 case SensorRole.LIDAR:
                     self._turns, self._turn_watch = TurnAssembler(self._config.lidar), TurnWatch()
                 case SensorRole.HEADING:

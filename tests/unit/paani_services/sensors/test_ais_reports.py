@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import functools
 import math
 from collections import Counter
 from typing import Any
@@ -45,6 +47,15 @@ class Receiver:
     def longitudes_deg(self) -> dict[int, float]:
         """Longitudes by vessel."""
         return {each.mmsi: each.longitude_deg for each in self.reports.vessels(self.now_us)}
+
+
+@pytest.mark.parametrize("payload", ["13,0", "53,0", "B3,0", "C3,0", "H3,0", "1300000,0"])
+def test_a_report_that_ends_too_soon_is_damage(payload: str) -> None:
+    receiver, body = Receiver(), f"!AIVDM,1,1,,A,{payload}"
+    checksum = functools.reduce(lambda found, byte: found ^ byte, body[1:].encode(), 0)
+    with contextlib.suppress(ValueError):
+        assert not receiver.reports.take_sentence(f"{body}*{checksum:02X}\r\n".encode(), START_US)
+    assert receiver.reports.vessels(START_US) == ()
 
 
 @pytest.mark.parametrize("kind", [1, 2, 3, 18, 19])

@@ -72,6 +72,22 @@ def test_a_receiver_at_rest_that_shows_no_course_has_no_speed() -> None:
     assert fix.sog_mps == 0.0
 
 
+@pytest.mark.parametrize("motion", [",084.4", "022.4,", "1.0,", ","])
+def test_a_receiver_that_does_not_tell_how_it_moves_has_no_fix(motion: str) -> None:
+    """An empty field is no measurement of 0 m/s, and what moves has a course."""
+    (fix,), drops = all_fixes(GGA, sentence(f"GPRMC,123519,A,4807.038,N,01131.000,E,{motion},230394,,"))
+    assert not fix.fix
+    assert not drops
+
+
+def test_a_deviation_of_nothing_is_none_that_is_known() -> None:
+    gga = sentence("GPGGA,123519,4807.038,N,01131.000,E,1,08,0.0,545.4,M,46.9,M,,")
+    gst = sentence("GPGST,123519,0.0,0.0,0.0,0.0,0.0,0.0,0.0")
+    for before in ((gga,), (gga, gst)):
+        (fix,), _ = all_fixes(*before, RMC)
+        assert fix.position_std_m == UNKNOWN_STD_M
+
+
 @pytest.mark.parametrize(
     "line",
     [

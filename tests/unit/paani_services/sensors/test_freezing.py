@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import random
 
 import msgspec
+import pytest
 
 from paani.messages import GpsFix
 from paani_services.sensors.freezing import GravityWatch, HeadingWatch, PositionWatch, SampleWatch
@@ -90,6 +92,20 @@ def test_waves_that_turn_the_boat_to_and_fro_are_no_turn() -> None:
     watch.take_heading(1.0)
     for wave in range(100):
         assert not turn(watch, 0.3 * (-1.0) ** wave, 0.4, 1.0 + 0.4 * wave)
+
+
+@pytest.mark.parametrize(("z", "is_implausible"), [(9.81, False), (-9.81, True)])
+def test_a_unit_that_stands_on_its_head_is_found_at_once(z: float, *, is_implausible: bool) -> None:
+    """Its gyro would turn the wrong way."""
+    assert GravityWatch().take(sample(z)) is is_implausible
+
+
+def test_a_unit_that_lies_on_its_side_is_found_and_a_boat_that_heels_is_not() -> None:
+    for heel_deg, is_implausible in ((50.0, False), (70.0, True), (90.0, True)):
+        heel_rad = math.radians(heel_deg)
+        accel_mps2 = (0.0, 9.81 * math.sin(heel_rad), 9.81 * math.cos(heel_rad))
+        leaning = InertialSample(accel_mps2, (0.0, 0.0, 0.0), None, None)
+        assert GravityWatch().take(leaning) is is_implausible
 
 
 def test_a_unit_that_writes_g_is_found_at_once_and_a_bump_is_not() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import random
 
 import msgspec
 import pytest
@@ -11,52 +10,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from paani.config import AisConfig, GpsConfig, HeadingConfig, ImuConfig, LidarConfig, SensorDevicesConfig, SonarConfig
-from paani.messages import GpsFix, ImuSample, SensorDevice, SensorRole, SensorStatus
+from paani.messages import ImuSample, SensorRole, SensorStatus
 from paani_services.sensors.fixes import RESYNC_FIXES
-from paani_services.sensors.suite import SensorSuite
-from tests.unit.paani_services.sensors.written import imu_line, nav_pvt, rmc, sentence
-
-GPS, IMU, HEADING = "serial:/dev/gps@9600", "serial:/dev/imu", "serial:/dev/compass@4800"
-RECEIVER, SCANNER = "serial:/dev/ais@38400", "serial:/dev/lidar@230400"
-SONAR = "serial:/dev/sonar@4800"
-LINES = [GPS, IMU, HEADING, RECEIVER, SCANNER, SONAR]
-CONFIG = SensorDevicesConfig(
-    gps=GpsConfig(line=GPS), imu=ImuConfig(line=IMU), heading=HeadingConfig(line=HEADING), variation_deg=2.0
+from tests.unit.paani_services.sensors.sensor_bench import (
+    CONFIG,
+    GPS,
+    HEADING,
+    IMU,
+    LINES,
+    RECEIVER,
+    SCANNER,
+    SONAR,
+    START_US,
+    Bench,
 )
-START_US = 1_700_000_000_000_000
-
-
-class Bench:
-    """The suite, and a clock that the test moves."""
-
-    def __init__(self, config: SensorDevicesConfig = CONFIG, *, is_open: bool = True) -> None:
-        self.suite, self.now_us = SensorSuite(config), START_US
-        self._noise = random.Random(1)
-        for address in self.suite.lines if is_open else ():
-            self.suite.opened(address, self.now_us)
-
-    def wait(self, seconds: float) -> None:
-        self.now_us += round(seconds * 1e6)
-
-    def fixes(self, data: bytes) -> tuple[GpsFix, ...]:
-        return self.suite.take(GPS, data, self.now_us).fixes
-
-    def samples(self, data: bytes) -> tuple[ImuSample, ...]:
-        return self.suite.take(IMU, data, self.now_us).samples
-
-    def noisy(self, ms: int, z: float = 9.81, rate_dps: float = 0.0) -> bytes:
-        return imu_line(ms, (0.0, 0.0, z + self._noise.gauss(0.0, 0.03)), (0.0, 0.0, rate_dps))
-
-    def run_imu(self, seconds: float, rate_dps: float = 0.0) -> list[ImuSample]:
-        """100 samples a second, each in its own piece."""
-        found: list[ImuSample] = []
-        for _ in range(round(seconds * 100)):
-            self.wait(0.01)
-            found += self.samples(self.noisy(self.now_us // 1000 % 1_000_000, rate_dps=rate_dps))
-        return found
-
-    def device(self, role: SensorRole) -> SensorDevice:
-        return next(device for device in self.suite.report(self.now_us) if device.role is role)
+from tests.unit.paani_services.sensors.written import imu_line, nav_pvt, rmc, sentence
 
 
 def test_without_settings_there_is_no_line_and_everything_is_off() -> None:
@@ -139,6 +107,17 @@ def test_a_receiver_whose_clock_was_set_back_is_believed_again_at_once() -> None
         bench.wait(1.0)
         taken.append(bool(bench.fixes(rmc(f"1230{second}"))))
     assert taken == [False] * (RESYNC_FIXES - 1) + [True] * (11 - RESYNC_FIXES)
+
+
+@pytest.mark.parametrize("back_s", [2, 3, 4])
+def test_a_clock_that_was_set_back_by_little_shuts_nobody_out(back_s: int) -> None:
+    """As receivers do when they hear of the leap seconds: the time before is reached again at once."""
+    bench = Bench()
+    taken = list[bool]()
+    for second in (*range(10, 20), *range(20 - back_s, 50)):
+        bench.wait(1.0)
+        taken.append(bool(bench.fixes(rmc(f"1235{second}"))))
+    assert taken == [True] * 10 + [False] * back_s + [True] * 30
 
 
 def test_a_receiver_without_a_position_is_not_late() -> None:
@@ -319,6 +298,18 @@ def test_a_line_that_is_opened_again_begins_anew() -> None:
     assert bench.device(SensorRole.GPS).status is SensorStatus.INCOMPLETE
     assert bench.fixes(rmc("100001"))
     assert bench.device(SensorRole.GPS).status is SensorStatus.OK
+
+
+def test_a_unit_that_was_pulled_out_and_began_anew_is_not_late() -> None:
+    """Its own clock began with it, and may be ahead of where it stood when it was pulled out."""
+    bench = Bench()
+    for ms in range(0, 5000, 10):
+        bench.wait(0.01)
+        bench.samples(bench.noisy(ms))
+    bench.suite.lost(IMU, "vanished")
+    bench.wait(15.0)
+    bench.suite.opened(IMU, bench.now_us)
+    assert [sample.source_us for sample in bench.samples(bench.noisy(6000))] == [bench.now_us]
 
 
 def test_damage_is_counted_by_cause() -> None:
