@@ -4,6 +4,7 @@ The local estimate never jumps; only the global one may guide the boat. Both say
 Time comes with the samples. An estimate is never simulator truth (L4).
 """
 
+import itertools
 import math
 from collections import Counter
 from collections.abc import Sequence
@@ -13,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from paani.config import LocalizationConfig
-from paani.geometry import clip, enu_from_geodetic, geodetic_from_enu
+from paani.geometry import clip, enu_from_geodetic, geodetic_from_enu, wrap_rad
 from paani.messages import GpsFix, ImuSample, Odometry
 from paani_services.localization.gyro_bias import estimate_gyro_bias
 from paani_services.localization.levelling import mean_level_motion
@@ -28,13 +29,16 @@ from paani_services.localization.planar_filter import PSI, PX, PY, SIZE, WX, WY,
 from paani_services.localization.rest_detection import MapFix, MotionEvidence, RestDetector
 from paani_services.localization.sensor_checks import check_fix, take_samples
 
-MAX_SAMPLE_GAP_S = 0.1  # mean gap between IMU samples beyond which the boat is not predicted across it
+MAX_SAMPLE_GAP_S = 0.1  # gap between IMU samples beyond which the boat is not predicted across it
 NOMINAL_GAP_S = 0.01  # between IMU samples at 100 Hz
 UNSEEN_SPEED_MPS, UNSEEN_TURN_RADPS = 0.5, 0.3  # what the boat may have done during a gap of the IMU
 YAW_STD_RAD = 0.02  # compass noise of one step
 YAW_GATE2 = 9.0  # validation gate of the compass, squared sigmas: at 20 Hz a refusal costs little
 COMPASS_BIAS_STD_RAD = 0.05  # at start, 3 degrees: an adjusted small compass on a small boat
 COMPASS_DOUBT_S, COMPASS_DOUBT_RAD = 1.0, 0.1  # refused for so long, compass or gyro has changed by about so much
+MAX_COMPASS_BIAS_RAD = (
+    0.35  # 20 degrees; what seems to be farther off is a gyro that turns wrongly, or a broken compass
+)
 COMPASS_AGE_S = 3.0  # without a compass for longer, the heading is a guess, even if the course makes it look sure (A12)
 COURSE_MPS = 0.3  # at a lower speed the course over ground says nothing of the heading
 # The part of a fix's standard deviation that is noise from fix to fix is estimated; the rest wanders slowly.
@@ -84,7 +88,8 @@ class Estimator:
         self._agreeing_refusals_m: list[tuple[float, float]] = []  # the latest refused fixes, as long as they agree
         self._refused_total = 0
         self._refused_speeds = 0
-        self._compass_refused_s = 0.0
+        self._compass_refused_s = self._compass_accepted_s = 0.0
+        self._is_heading_doubted = False
         self._noise_frac2 = GPS_NOISE_FRAC**2
         self._noise_fixes = FIRST_NOISE_FIXES
         self._position_doubt_m = 0.0  # length of the last jump to the receiver's position; fades
@@ -120,7 +125,7 @@ class Estimator:
             return
         before_us = self._last_imu.source_us if self._last_imu else 0
         step_s = (newest.source_us - before_us) * 1e-6
-        if step_s > MAX_SAMPLE_GAP_S * len(samples):
+        if longest_gap_s(samples, before_us) > MAX_SAMPLE_GAP_S:
             self._bridge_imu_gap(step_s)
             step_s = NOMINAL_GAP_S * len(samples)
         self._last_imu = newest
@@ -145,14 +150,18 @@ class Estimator:
             self._global.correct_sideslip(REST_STD_MPS, REST_STD_MPS)
 
     def _correct_heading(self, global_filter: PlanarFilter, yaw_rad: float, step_s: float) -> None:
-        """Correct with the compass; where it is refused for long, doubt heading and compass: the course decides."""
+        """Correct with the compass; where it is refused for long, doubt heading and compass: the course decides.
+
+        Which of gyro and compass is wrong is not known then, nor is the heading, until they agree for as long.
+        """
         if global_filter.correct_yaw(yaw_rad, YAW_STD_RAD, YAW_GATE2).is_accepted:
-            self._compass_refused_s = 0.0
+            self._compass_refused_s, self._compass_accepted_s = 0.0, self._compass_accepted_s + step_s
+            self._is_heading_doubted &= self._compass_accepted_s < COMPASS_DOUBT_S
             return
-        self._compass_refused_s += step_s
+        self._compass_refused_s, self._compass_accepted_s = self._compass_refused_s + step_s, 0.0
         if self._compass_refused_s >= COMPASS_DOUBT_S:
             global_filter.inflate_covariance(_std(psi=COMPASS_DOUBT_RAD, c=COMPASS_DOUBT_RAD))
-            self._compass_refused_s = 0.0
+            self._compass_refused_s, self._is_heading_doubted = 0.0, True
 
     def _bridge_imu_gap(self, gap_s: float) -> None:
         """Widen both filters by what the boat may have done in a gap of the IMU."""
@@ -280,6 +289,8 @@ class Estimator:
         healthy = (
             odometry.healthy
             and is_fresh(self._last_heading, COMPASS_AGE_S, now_us)
+            and not self._is_heading_doubted
+            and abs(wrap_rad(float(self._global.x[C]))) <= MAX_COMPASS_BIAS_RAD
             and is_fresh(self._last_fix, self._config.max_gps_age_s, now_us)
             and self._accepted_fixes >= CONVERGED_FIXES
             and self._refused_fixes < DOUBTFUL_FIXES
@@ -298,6 +309,12 @@ class Estimator:
 
     def _odometry(self, source: PlanarFilter, now_us: int, *, healthy: bool) -> Odometry:
         return odometry_of(source, self._last_imu, now_us, healthy=healthy, stopped=self._stopped.is_set(now_us))
+
+
+def longest_gap_s(samples: Sequence[ImuSample], before_us: int) -> float:
+    """The longest time between two samples in a row, the one before them included."""
+    times_us = (before_us, *(each.source_us for each in samples))
+    return max(later - earlier for earlier, later in itertools.pairwise(times_us)) * 1e-6
 
 
 def _initial_yaw_std_rad(sample: ImuSample) -> float:

@@ -3,12 +3,13 @@
 import math
 import statistics
 from collections import deque
+from collections.abc import Callable
 
 import msgspec
 import pytest
 
 from paani.config import LocalizationConfig
-from paani.geometry import geodetic_from_enu
+from paani.geometry import geodetic_from_enu, wrap_rad
 from paani.messages import GpsFix, ImuSample
 from paani_services.localization.gyro_bias import UNCALIBRATED_STD_RADPS, estimate_gyro_bias
 from tests.unit.paani_services.localization.estimated_boat import BIAS_RADPS, ORIGIN_DEG, EstimatedBoat
@@ -168,6 +169,56 @@ def test_a12_a_compass_that_falls_silent_ends_health(boat: EstimatedBoat) -> Non
     estimates = boat.sail(5.0, surge_mps=0.6)
     assert estimates[50].healthy
     assert not any(one.healthy for one in estimates[62:])
+
+
+def stuck(sample: ImuSample) -> ImuSample:
+    return msgspec.structs.replace(sample, gyro_z_radps=0.0)
+
+
+def in_degrees(sample: ImuSample) -> ImuSample:
+    return msgspec.structs.replace(sample, gyro_z_radps=sample.gyro_z_radps * 180.0 / math.pi)
+
+
+def in_turns(sample: ImuSample) -> ImuSample:
+    return msgspec.structs.replace(sample, gyro_z_radps=sample.gyro_z_radps / (2.0 * math.pi))
+
+
+def reversed_turns(sample: ImuSample) -> ImuSample:
+    return msgspec.structs.replace(sample, gyro_z_radps=-sample.gyro_z_radps)
+
+
+@pytest.mark.parametrize("fault", [stuck, in_turns, in_degrees, reversed_turns])
+@pytest.mark.slow
+def test_a_gyro_that_contradicts_the_compass_is_believed_no_more_than_it(
+    fault: Callable[[ImuSample], ImuSample],
+) -> None:
+    """Compass and receiver are right: what is called healthy is no more than 25 degrees off, and seldom so."""
+    boat = EstimatedBoat()
+    boat.change_samples = lambda samples: [fault(each) for each in samples]
+    boat.sail(10.0)
+    healthy, steps, wrong = 0, 0, 0
+    for leg in range(12):
+        for _ in range(25):
+            boat.sail(0.2, surge_mps=0.6, yaw_rate_radps=0.2 if leg % 2 else 0.0)
+            estimate, steps = boat.global_estimate, steps + 1
+            if estimate.healthy:
+                off_rad = abs(wrap_rad(estimate.yaw_rad - boat.yaw_rad))
+                assert off_rad < math.radians(25.0)
+                healthy, wrong = healthy + 1, wrong + (off_rad > 3.0 * estimate.yaw_std_rad)
+    assert wrong <= 0.03 * steps
+    assert healthy < 0.3 * steps
+
+
+def test_of_samples_after_a_stall_the_gap_before_them_counts_not_their_number(boat: EstimatedBoat) -> None:
+    """A process that was held up for five seconds finds the newest samples alone, as many as its queue holds."""
+    kept = deque[ImuSample](maxlen=64)
+    for number in range(500):
+        kept.append(boat.sample(0.0, 0.3 if number < 430 else 0.0))
+    boat.estimator.step(list(kept), boat.fix(), boat.now_us)
+    assert wrap_rad(boat.yaw_rad) != pytest.approx(0.5, abs=0.5)
+    after = [each for each in boat.sail(5.0) if each.healthy]
+    assert after
+    assert max(abs(wrap_rad(each.yaw_rad - boat.yaw_rad)) for each in after) < 0.1
 
 
 @pytest.mark.parametrize("late", [0, 2, 4])
