@@ -12,7 +12,7 @@ import msgspec
 from paani import keys
 from paani import messages as m
 from paani.bus import Publisher
-from paani.clock import Clock
+from paani.clock import Clock, has_passed
 from paani.missions import find_mission_fault
 from paani_services.operator import missions
 from paani_services.operator import state as op
@@ -21,6 +21,7 @@ from paani_services.operator.latch import LATCH_FILE, read_latch, write_latch
 from paani_services.operator.return_place import find_seen_fault
 
 LOG = logging.getLogger(__name__)
+ARM_WITHIN_S = 1.0  # after the button was let go; whoever arms has turned away from a page that says nothing
 WATCH_PERIOD_S = 0.02  # how late a stick that nobody holds may be let go
 
 
@@ -163,17 +164,18 @@ class Console:
         await self._keep()
 
     async def _arm(self, client: str, press: int, station_epoch: int) -> m.ArmRefusal:
-        """Arm; why not, where a STOP came meanwhile or the latch could not be written."""
-        stops = self.state.stops
+        """Arm; why not, where a STOP came meanwhile or the latch could not be written, or not in time."""
+        stops, let_go_us = self.state.stops, self._clock.now_us()
         async with self._write_lock:
             if not await asyncio.to_thread(write_latch, self._path, op.ARMED):
                 return m.ArmRefusal.NOT_WRITTEN
-            if self.state.stops == stops:
+            is_late = has_passed(let_go_us, ARM_WITHIN_S * 1e6, self._clock.now_us())
+            if self.state.stops == stops and not is_late:
                 self._become(op.arm(self.state, client, press, station_epoch))
                 self._latch_kept = True
                 return m.ArmRefusal.NONE
         await self._keep()
-        return m.ArmRefusal.STOPPED
+        return m.ArmRefusal.NOT_WRITTEN if is_late else m.ArmRefusal.STOPPED
 
     def _is_answered(self, client: str, press: int) -> bool:
         """Whether this press has ended, so that a RELEASE said again changes nothing."""

@@ -97,7 +97,7 @@ def answer(wheel: Wheel, client: str, request: m.OperatorRequest, facts: Facts, 
     A request that is said again, as its answer gave way to that of another, is told the same and does nothing.
     """
     if request.act is RequestAct.DRIVE:
-        return drive(wheel, client, request, now_us)
+        return drive(lapse(wheel, now_us, armed=armed), client, request, now_us)
     for given in wheel.answers:
         if (given.client, given.press) == (client, request.press):
             return replace(wheel, answer=given)

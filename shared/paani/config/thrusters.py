@@ -52,5 +52,8 @@ class ThrustersConfig(Section, frozen=True):
                 require_line(self.line)
             except ValueError as error:
                 raise ValueError(f"line: {error}") from error
+        for name, esc in (("left", self.left), ("right", self.right)):
+            if esc.deadband_us >= self.span_us:
+                raise ValueError(f"{name}.deadband_us {esc.deadband_us}: leaves nothing of span_us {self.span_us}")
         if self.lease_ms * self.rate_hz < 2 * 1000.0:
             raise ValueError(f"lease_ms {self.lease_ms}: shorter than two frames at rate_hz {self.rate_hz:g}")

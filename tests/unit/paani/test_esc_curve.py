@@ -32,3 +32,8 @@ def test_known_pulses() -> None:
     assert [pulse_us(thrust, SETTINGS, esc) for thrust in (-1.0, 0.0, 0.5, 1.0)] == [1110.0, 1510.0, 1720.0, 1910.0]
     assert pulse_us(1.0, SETTINGS, EscConfig(reversed=True)) == 1100.0
     assert thrust_of(3000.0, SETTINGS, esc) == 1.0
+
+
+def test_a_deadband_that_leaves_no_pulse_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"right\.deadband_us 100: leaves nothing of span_us 100"):
+        ThrustersConfig(span_us=100, right=EscConfig(deadband_us=100))

@@ -134,6 +134,24 @@ async def test_a_failing_disk_stops_and_does_not_arm(tmp_path: Path) -> None:
     assert not desk.states.messages[-1].latch_kept
 
 
+@pytest.mark.parametrize(("write_s", "is_armed"), [(0.9, True), (1.0, False), (8.0, False)])
+async def test_a_slow_disk_arms_nobody_who_let_the_button_go_long_ago(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, write_s: float, *, is_armed: bool
+) -> None:
+    desk = Desk(tmp_path)
+
+    def write_slowly(path: Path, text: str) -> bool:
+        desk.clock.advance(write_s)
+        return write_latch(path, text)
+
+    monkeypatch.setattr("paani_services.operator.console.write_latch", write_slowly)
+    await desk.arm()
+    assert desk.console.state.armed is is_armed
+    assert any(message.armed for message in desk.arming.messages) is is_armed
+    assert (desk.states.messages[-1].refusal is m.ArmRefusal.NONE) is is_armed
+    assert await desk.latch() == (op.ARMED if is_armed else op.STOPPED)
+
+
 async def test_without_the_pages_process_nobody_arms(tmp_path: Path) -> None:
     desk = Desk(tmp_path)
     await desk.hold()

@@ -188,6 +188,14 @@ def test_a_boat_that_is_disarmed_or_stopped_has_no_hand_at_the_stick_when_it_is_
     assert (bridge.order.mode, bridge.order.surge) == (DriveMode.IDLE, 0.0)
 
 
+def test_words_that_waited_while_the_process_was_held_up_are_none_of_now() -> None:
+    """Of a hand that is gone meanwhile: the silence before them has ended MANUAL."""
+    bridge = at_the_wheel()
+    bridge.now_us += 3_000_000
+    bridge.drive(1.0)
+    assert (bridge.order.mode, bridge.order.surge) == (DriveMode.IDLE, 0.0)
+
+
 def test_a_set_point_that_was_overtaken_is_passed_over_also_after_manual_began_again() -> None:
     bridge = at_the_wheel()
     bridge.drive(0.0, number=1000)
