@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import msgspec
@@ -11,6 +11,7 @@ from paani import messages as m
 from paani.undecodable import UNDECODABLE
 
 ABSENT = "(absent)"
+Schema = Mapping[str, Any]
 
 
 class Difference(msgspec.Struct, frozen=True, kw_only=True):
@@ -41,10 +42,11 @@ def first_difference(at_us: int, sent: m.OutputMessage, recorded: bytes, compute
     )
 
 
-def as_recorded(computed: bytes, recorded: bytes | None) -> bytes:
+def as_recorded(computed: bytes, recorded: bytes | None, schema: Schema | None = None) -> bytes:
     """The computed payload without the fields that the version which recorded did not have.
 
-    Messages and states are closed structures that only ever gain fields, so that an absent field is an added one.
+    schema: of the recorded messages (`paani.logs.schema`). What it knows and the message lacks was not set, which is a
+    value of its own. Without one an absent field is taken for an added one, as structures only ever gain fields.
     """
     if recorded is None or computed == recorded:
         return computed
@@ -52,15 +54,26 @@ def as_recorded(computed: bytes, recorded: bytes | None) -> bytes:
         before, now = msgspec.json.decode(recorded), msgspec.json.decode(computed)
     except UNDECODABLE:
         return computed
-    return msgspec.json.encode(_without_added(before, now))
+    return msgspec.json.encode(_without_added(before, now, schema))
 
 
-def _without_added(before: Any, now: Any) -> Any:
+def _without_added(before: Any, now: Any, schema: Schema | None) -> Any:
     if isinstance(before, dict) and isinstance(now, dict):
-        return {name: _without_added(before[name], value) for name, value in now.items() if name in before}
+        known = _part(schema, "properties")
+        return {
+            name: _without_added(before[name], value, _part(known, name)) if name in before else value
+            for name, value in now.items()
+            if name in before or name in (known or ())
+        }
     if isinstance(before, list) and isinstance(now, list) and len(before) == len(now):
-        return [_without_added(one, other) for one, other in zip(before, now, strict=True)]
+        item = _part(schema, "items")
+        return [_without_added(one, other, item) for one, other in zip(before, now, strict=True)]
     return now
+
+
+def _part(schema: Schema | None, name: str) -> Schema | None:
+    part = None if schema is None else schema.get(name)
+    return part if isinstance(part, dict) else None
 
 
 def differing_fields(recorded: bytes, computed: bytes) -> Iterator[tuple[str, Any, Any]]:

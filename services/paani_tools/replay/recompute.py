@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from enum import StrEnum
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import msgspec
@@ -13,7 +14,7 @@ from paani.config import Config
 from paani.decider import Decider
 from paani.logs.reader import Record
 from paani.undecodable import UNDECODABLE
-from paani_tools.replay.difference import as_recorded
+from paani_tools.replay.difference import Schema, as_recorded
 from paani_tools.replay.ledger import LATE_US, NO_PAYLOADS, Ledger, MessageId, RecordedStep
 
 
@@ -35,10 +36,14 @@ class ExpectedGap(StrEnum):
 
 
 class Losses(NamedTuple):
-    """Messages of each topic that the recorder has counted as lost, and when each recording began and ended [us]."""
+    """Messages of each topic that the recorder has counted as lost, and when each recording began and ended [us].
+
+    schemas: of the messages of each topic, which tell a field that was not set from one that was not known yet.
+    """
 
     counted: Mapping[str, int]
     recordings: tuple[tuple[int, int], ...]
+    schemas: Mapping[str, Schema] = MappingProxyType({})
 
     def at_edge(self, log_us: int) -> bool:
         """Whether a recording began or ended about then, so that what belongs together may not be in it together."""
@@ -151,13 +156,16 @@ class Recomputation:
         try:
             self._state, outputs = self._decider.decide(self._state, given.inputs, step.source_us, self._config)
             compared = tuple(
-                (sent, recorded, as_recorded(self._encoded(sent, outputs[sent.topic]), recorded))
+                (sent, recorded, self._as_recorded(sent, self._encoded(sent, outputs[sent.topic]), recorded))
                 for sent, recorded in given.sent
             )
         except Exception as error:  # noqa: BLE001  # a log may hold what no live process could have been given
             self._lose(SkipReason.AFTER_BREAK, None)
             return RecomputedStep(given, skip=SkipReason.FAILED, detail=f"{type(error).__name__}: {error}")
         return RecomputedStep(given, compared, state_same=same)
+
+    def _as_recorded(self, sent: m.OutputMessage, computed: bytes, recorded: bytes | None) -> bytes:
+        return as_recorded(computed, recorded, self._losses.schemas.get(sent.topic))
 
     def _encoded(self, sent: m.OutputMessage, message: m.Message) -> bytes:
         """As the bus would have sent it, with the header that the step has kept."""

@@ -12,8 +12,10 @@ from paani.clock import stopwatch_ms
 from paani.config import Config, with_settings
 from paani.decider import Decider, deciders
 from paani.logs.reader import Log
+from paani.undecodable import UNDECODABLE
 from paani_tools.progress import Progress
 from paani_tools.replay.check import ServiceCheck, StepCallback, check_service
+from paani_tools.replay.difference import Schema
 from paani_tools.replay.ledger import Ledger, MessageId
 from paani_tools.replay.recompute import Losses, RecomputedStep
 from paani_tools.replay.whatif import ServiceChanges, changes_of
@@ -150,4 +152,12 @@ def losses_of(log: Log) -> Losses:
                 name, _, number = word.partition("=")
                 if name in {"dropped", "missing"} and number.isdecimal():
                     lost[topic] = lost.get(topic, 0) + int(number)
-    return Losses(lost, log.recordings)
+    return Losses(lost, log.recordings, {topic: _schema_of(log, topic) for topic in log.topics})
+
+
+def _schema_of(log: Log, topic: str) -> Schema:
+    """What the recording says of a topic's messages; nothing where that is none of ours."""
+    try:
+        return msgspec.json.decode(log.schema(topic) or b"{}", type=dict[str, Any])
+    except UNDECODABLE:
+        return {}

@@ -37,12 +37,14 @@ class Span(msgspec.Struct, frozen=True):
 
 
 class Layout(msgspec.Struct):
-    """One file. `channels` are topics by id; `counts` messages by topic."""
+    """One file. `channels` are topics by id; `counts` messages by topic; `schemas` by id, and `schema_ids` by topic."""
 
     path: Path
     library: str = ""
     spans: list[Span] = []
     channels: dict[int, str] = {}
+    schemas: dict[int, bytes] = {}
+    schema_ids: dict[str, int] = {}
     counts: dict[str, int] = {}
     attachments: dict[str, bytes] = {}
     metadata: dict[str, dict[str, str]] = {}

@@ -11,7 +11,7 @@ from typing import Any
 
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, ChunkIndex, Footer, Header, Metadata, Statistics
+from mcap.records import Attachment, Channel, ChunkIndex, Footer, Header, Metadata, Schema, Statistics
 
 from paani.errors import UserError
 from paani.logs.layout import DAMAGE, MAGIC, PROFILE, Layout, Span, line_of, messages_in, unpacked_chunk
@@ -78,8 +78,8 @@ def _read_summary(layout: Layout, data: mmap.mmap) -> bool:
         record = _record_at(data, place)
         place = record.end
         match record.opcode:
-            case Opcode.CHANNEL:
-                _learn_channel(layout, content(data, record))
+            case Opcode.CHANNEL | Opcode.SCHEMA:
+                _learn_channel(layout, record, content(data, record))
             case Opcode.STATISTICS:
                 statistics = Statistics.read(_stream(content(data, record)))
                 counts, total = statistics.channel_message_counts, statistics.message_count
@@ -151,8 +151,8 @@ def _learn_loose(layout: Layout, data: mmap.mmap, records: list[ScannedRecord]) 
 def _learn_messages(layout: Layout, inside: bytes) -> list[int]:
     """Channels and counts; returns the times of the messages [us]."""
     for record in records_in(inside):
-        if record.opcode == Opcode.CHANNEL:
-            _learn_channel(layout, content(inside, record))
+        if record.opcode in {Opcode.CHANNEL, Opcode.SCHEMA}:
+            _learn_channel(layout, record, content(inside, record))
     times_us = []
     for number, _, log_ns, _ in messages_in(inside, layout.channels):
         topic = layout.channels[number]
@@ -161,9 +161,15 @@ def _learn_messages(layout: Layout, inside: bytes) -> list[int]:
     return times_us
 
 
-def _learn_channel(layout: Layout, inside: bytes) -> None:
+def _learn_channel(layout: Layout, record: ScannedRecord, inside: bytes) -> None:
+    """A channel, or the schema of its messages."""
+    if record.opcode == Opcode.SCHEMA:
+        schema = Schema.read(_stream(inside))
+        layout.schemas[schema.id] = schema.data
+        return
     channel = Channel.read(_stream(inside))
     layout.channels[channel.id] = channel.topic
+    layout.schema_ids[channel.topic] = channel.schema_id
 
 
 def _learn(layout: Layout, data: mmap.mmap, record: ScannedRecord) -> None:

@@ -82,6 +82,13 @@ class Log:
         """The first attachment of that name."""
         return next((part.attachments[name] for part in self._parts if name in part.attachments), None)
 
+    def schema(self, topic: str) -> bytes | None:
+        """The schema that the first part with such a channel has for the messages of a topic."""
+        for part in self._parts:
+            if (number := part.schema_ids.get(topic, 0)) in part.schemas:
+                return part.schemas[number]
+        return None
+
     def metadata(self, name: str) -> dict[str, str]:
         """The metadata records of that name; a later part wins where a key repeats. Empty where there is none."""
         return {key: value for record in self.metadata_by_part(name) for key, value in record.items()}
@@ -158,6 +165,7 @@ def _take_present_names(layout: Layout) -> None:
         name = present_name(topic)
         layout.counts[name] = layout.counts.get(name, 0) + count
     layout.channels = {number: present_name(topic) for number, topic in layout.channels.items()}
+    layout.schema_ids = {present_name(topic): number for topic, number in layout.schema_ids.items()}
     if RECORDER in layout.metadata:
         layout.metadata[RECORDER] = {present_name(key): text for key, text in layout.metadata[RECORDER].items()}
 

@@ -149,9 +149,10 @@ def write_log(
     config: Config | None = CONFIG,
     *,
     attached: Mapping[str, bytes] = types.MappingProxyType({}),
+    schemas: Mapping[str, bytes] = types.MappingProxyType({}),
     chunked: bool = True,
 ) -> Path:
-    """An MCAP file as a recorder writes it."""
+    """An MCAP file as a recorder writes it, with these schemas of topics."""
     attachments = {} if config is None else {"config.json": encode_config(config)}
     with path.open("wb") as file:
         writer = Writer(file, chunk_size=64 * 1024, use_chunking=chunked)
@@ -162,7 +163,8 @@ def write_log(
             writer.add_attachment(0, 0, name, "application/json", data)
         for topic, log_us, seq, data in records:
             if topic not in channels:
-                channels[topic] = writer.register_channel(topic, "json", schema)
+                of = writer.register_schema(topic, "jsonschema", schemas[topic]) if topic in schemas else schema
+                channels[topic] = writer.register_channel(topic, "json", of)
             writer.add_message(channels[topic], log_us * 1000, data, log_us * 1000, seq)
         writer.finish()
     return path
