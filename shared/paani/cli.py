@@ -17,8 +17,13 @@ from paani.process import run_service, services
 from paani.version import version_text
 
 
+UNREAD = 128 + 13  # as of what SIGPIPE ends: the reader of the output went away, and with it how the command ended
+
+
 def main(argv: list[str] | None = None) -> int:
-    """Exit codes: 0 done, 1 crash, 2 user's mistake (one line on standard error)."""
+    """Exit codes: 0 done, 1 crash, 2 user's mistake (one line on standard error), 141 nobody reads the output."""
+    if sys.stdout is None:  # it was closed by whoever began this process
+        sys.stdout = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115  # as long as the process lives
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # as standard error: a name may be bytes that are no text
     arguments = sys.argv[1:] if argv is None else argv
@@ -49,18 +54,28 @@ def main(argv: list[str] | None = None) -> int:
     except OSError as error:
         if error.errno not in {errno.EPIPE, errno.ENOSPC}:
             raise
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        if error.errno == errno.EPIPE:  # the reader of our output went away
-            return 0
+        _forget_output()
+        if error.errno == errno.EPIPE:
+            return UNREAD
         sys.stderr.write(f"paani: {error.strerror}\n")
         return 1
+
+
+def _forget_output() -> None:
+    """Nobody reads standard output any more: the rest of it goes nowhere."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _run(name: str, rest: list[str], commands: dict[str, EntryPoint]) -> int:
     try:
         if name in commands:
             code = int(commands[name].load()(rest))
-            sys.stdout.flush()  # what cannot be written is said now, not by the interpreter at its end
+            try:
+                sys.stdout.flush()  # what cannot be written is said now, not by the interpreter at its end
+            except BrokenPipeError:
+                if code == 0:
+                    raise
+                _forget_output()
             return code
         return run_service(name, _service_config(name, rest))
     except ModuleNotFoundError as error:

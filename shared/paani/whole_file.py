@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -23,9 +24,17 @@ def write_json(path: Path, value: object, option: str = "") -> None:
     write_whole(path, indented_json(value), option)
 
 
+def json_line(value: object) -> bytes:
+    """JSON in one line. A name of bytes that are no text is escaped, as Python reads it back."""
+    try:
+        return msgspec.json.encode(value) + b"\n"
+    except UnicodeEncodeError:
+        return json.dumps(msgspec.to_builtins(value)).encode() + b"\n"
+
+
 def indented_json(value: object) -> bytes:
     """JSON that people can read, with a line end; the same for the same value."""
-    return msgspec.json.format(msgspec.json.encode(value), indent=1) + b"\n"
+    return msgspec.json.format(json_line(value), indent=1) + b"\n"
 
 
 @contextlib.contextmanager

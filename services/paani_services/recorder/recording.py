@@ -14,7 +14,7 @@ from paani import keys
 from paani import messages as m
 from paani.clock import has_passed
 from paani.config import RecorderConfig
-from paani.logs.folder import free_path, recordings, too_old
+from paani.logs.folder import free_path, is_being_written, recordings, too_old
 from paani.logs.writer import About, LogWriter
 from paani_services.recorder.backlog import QueuedMessage
 from paani_services.recorder.counts import MessageCounts, file_counts
@@ -98,7 +98,7 @@ class Recording:
         """Delete the oldest recordings beyond the budget; pause recording while the disk has too little space left."""
         found = recordings(self._folder)
         kept = sum(recording.size_bytes for recording in found if recording.kept)
-        others = [recording for recording in found if recording.path != self.path]
+        others = [each for each in found if each.path != self.path and not is_being_written(each.path)]
         for path in too_old(others, self._settings.budget_mib * MIB - self.size_bytes):
             path.unlink(missing_ok=True)
         self.free_bytes = shutil.disk_usage(self._folder).free

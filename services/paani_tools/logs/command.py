@@ -6,14 +6,13 @@ import argparse
 import sys
 from pathlib import Path
 
-import msgspec
-
 from paani.errors import UserError
 from paani.extras import require_modules
 from paani.logs.folder import recordings
 from paani.logs.reader import Log, Record, open_log
 from paani.logs.repair import repair
 from paani.option_paths import input_folder, input_path, output_file, output_folder
+from paani.whole_file import json_line
 from paani_tools.logs.export import export_csv, export_geojson, export_gpx
 from paani_tools.logs.export_ros2 import export_ros2
 from paani_tools.logs.info import info_of, info_text, list_text
@@ -38,7 +37,7 @@ def _info(path: Path, *, as_json: bool) -> int:
     log = open_log(path)
     with Progress("reading") as progress:
         info = info_of(log, ReadProgress(log, progress))
-    sys.stdout.write(msgspec.json.encode(info).decode() + "\n" if as_json else info_text(info))
+    sys.stdout.write(json_line(info).decode() if as_json else info_text(info))
     for problem in info.problems:
         sys.stderr.write(f"paani: {problem}\n")
     return 1 if info.problems else 0

@@ -112,9 +112,13 @@ def info_of(log: Log, seen: Callable[[Record], None] = lambda record: None) -> L
             for name, one in sorted(channels.items())
         ),
         advisories=directions.advisories,
-        direction_changes_per_min=round(60 * directions.changes / duration_s, 2) if directions.advisories else None,
+        direction_changes_per_min=_per_min(directions.changes, duration_s) if directions.advisories else None,
         problems=tuple(log.problems),
     )
+
+
+def _per_min(count: int, duration_s: float) -> float:
+    return round(60 * count / duration_s, 2) if duration_s > 0.0 else 0.0
 
 
 class DirectionChanges:

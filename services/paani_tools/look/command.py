@@ -13,7 +13,7 @@ from paani.clock import stopwatch_ms
 from paani.errors import UserError
 from paani.messages import Detection, Direction, LaneRisk, Reason, Text, Unit, UnusableCause
 from paani.option_paths import input_path, output_file, output_folder
-from paani.whole_file import write_whole
+from paani.whole_file import json_line, write_whole
 from paani_services.perception.pipeline import Perceiver
 from paani_tools.look.annotate import annotate_picture
 from paani_tools.look.contact_sheet import ContactSheet
@@ -62,7 +62,7 @@ def main(argv: list[str]) -> int:
         for index, path in enumerate(options.paths):
             for verdict in judge_path(path, index * EPOCHS_PER_PATH, perceiver, config):
                 count += 1
-                sys.stdout.write(json_line(verdict) if options.json else readable_line(verdict))
+                sys.stdout.write(json_text(verdict) if options.json else readable_line(verdict))
                 if (out or options.sheet) and verdict.bgr is not None:
                     picture = annotate_picture(
                         verdict.bgr,
@@ -108,12 +108,12 @@ def readable_line(verdict: Verdict) -> str:
     return f"{verdict.name}  {advice.direction.value:<12}  {reason}  risk {count}  {advice.explanation}\n"
 
 
-def json_line(verdict: Verdict) -> str:
+def json_text(verdict: Verdict) -> str:
     """One line for programs: `JsonLine`."""
     advice = verdict.advisory
     lanes = (advice.left, advice.center, advice.right)
     line = JsonLine(
-        path=verdict.name.encode(errors="backslashreplace").decode(),  # it may be bytes that are no text
+        path=verdict.name,
         usable=verdict.evidence.usable,
         cause=verdict.evidence.cause,
         direction=advice.direction,
@@ -123,7 +123,7 @@ def json_line(verdict: Verdict) -> str:
         detections=verdict.evidence.detections,
         explanation=advice.explanation,
     )
-    return msgspec.json.encode(line).decode() + "\n"
+    return json_line(line).decode()
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -116,7 +116,9 @@ def _repair(path: Path, data: mmap.mmap, told_to_stop: Callable[[], bool]) -> Re
     if not damage and is_finished(path) and not has_damaged_summary(path, data):
         return Repaired(path=path, changed=False)
     _require_ours(path, data, pieces)
+    loose = sum(isinstance(piece, ScannedRecord) and piece.opcode == Opcode.MESSAGE for piece in pieces)
     lost = tuple(f"bytes {d.start} to {d.end}: {d.cause}" for d in damage)
+    lost += (f"{loose} messages outside chunks, which no recorder writes",) if loose else ()
     original = None
     with replacement_file(path) as beside:
         with beside.open("wb") as file:
@@ -129,7 +131,7 @@ def _repair(path: Path, data: mmap.mmap, told_to_stop: Callable[[], bool]) -> Re
             mended.finish(lost)
             file.flush()
             os.fsync(file.fileno())
-        if any(d.end < len(data) for d in damage):
+        if loose or any(d.end < len(data) for d in damage):
             original = _keep(path)
     return Repaired(path=path, changed=True, messages=mended.messages, lost=lost, original=original)
 

@@ -300,3 +300,22 @@ def test_a_format_of_more_digits_than_a_number_has_is_a_later_one(tmp_path: Path
         writer.add_metadata("paani", {"format": "9" * 5000})
         writer.finish()
     assert "this program reads up to" in refusal(lambda: open_log(path))
+
+
+def test_messages_outside_chunks_are_left_out_said_and_kept_beside(tmp_path: Path) -> None:
+    path = tmp_path / NAME
+    with path.open("wb") as file:
+        writer = Writer(file, use_chunking=False)
+        writer.start("paani", "paani 0.1.0")
+        channel = writer.register_channel(
+            "localization/odometry", "json", writer.register_schema("a", "jsonschema", b"{}")
+        )
+        for number in range(N):
+            writer.add_message(channel, number, b"{}", number, number)
+        writer.finish()
+    loose = path.read_bytes()[:-20]
+    path.write_bytes(loose)
+    repaired = repair(path)
+    assert (repaired.messages, repaired.lost[-1]) == (0, f"{N} messages outside chunks, which no recorder writes")
+    assert repaired.original is not None
+    assert repaired.original.read_bytes() == loose
