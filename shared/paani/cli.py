@@ -16,7 +16,6 @@ from paani.extras import missing_module
 from paani.process import run_service, services
 from paani.version import version_text
 
-
 UNREAD = 128 + 13  # as of what SIGPIPE ends: the reader of the output went away, and with it how the command ended
 
 
