@@ -26,6 +26,7 @@ INHIBIT_TEXTS = {
     m.Inhibit.ADVISED_STOP: "stopped: advised by the camera",
     m.Inhibit.ADVISED_NO_DATA: "camera gives no data",
     m.Inhibit.TURN_CAPPED: "stopped: advised turn is too long",
+    m.Inhibit.MAP_MOVED: "map begins elsewhere: start PAANI anew",
     m.Inhibit.NO_ROUTE: "no route to follow",
     m.Inhibit.ROUTE_FINISHED: "route finished",
     m.Inhibit.NO_FREE_PATH: "stopped: no free path",

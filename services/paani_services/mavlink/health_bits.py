@@ -34,6 +34,7 @@ FAULTS = frozenset(
         m.Inhibit.NO_ODOMETRY,
         m.Inhibit.STALE_ODOMETRY,
         m.Inhibit.UNHEALTHY_ODOMETRY,
+        m.Inhibit.MAP_MOVED,
         m.Inhibit.NO_ADVISORY,
         m.Inhibit.STALE_ADVISORY,
         m.Inhibit.ADVISED_NO_DATA,

@@ -5,6 +5,7 @@ import math
 import msgspec
 
 from paani.config import NavigatorConfig
+from paani.map_origin import MapPlace, is_map_moved, map_place_of
 from paani.messages import (
     Advisory,
     AisVessels,
@@ -47,11 +48,17 @@ def is_out_of_date(stamp_us: int, limit_s: float, now_us: int, config: Navigator
 
 
 def find_inhibits(
-    inputs: NavigatorInputs, clock_advanced_us: int | None, now_us: int, domain: int, config: NavigatorConfig
+    inputs: NavigatorInputs,
+    clock_advanced_us: int | None,
+    map_place: MapPlace | None,
+    now_us: int,
+    domain: int,
+    config: NavigatorConfig,
 ) -> list[Inhibit]:
     """Everything about the inputs that forbids motion (M8-M11).
 
-    clock_advanced_us: when simulated time last moved forward; None before it did.
+    clock_advanced_us: when simulated time last moved forward; None before it did. map_place: by which the map is known
+    in which mission and fence lie; where localization has begun another, they lie elsewhere on Earth.
     """
 
     def is_old(limit_s: float, *stamps_us: int) -> bool:
@@ -81,6 +88,8 @@ def find_inhibits(
         numbers = (odometry.x_m, odometry.y_m, odometry.yaw_rad)
         if not odometry.healthy or not all(map(math.isfinite, numbers)):
             found.append(Inhibit.UNHEALTHY_ODOMETRY)
+        if is_map_moved(map_place, map_place_of(odometry)):
+            found.append(Inhibit.MAP_MOVED)
     if advisory is None:
         found.append(Inhibit.NO_ADVISORY)
     else:

@@ -12,6 +12,7 @@ from paani.clock import has_passed
 from paani.config import NavigatorConfig
 from paani.fence_geometry import Fence, is_allowed
 from paani.geometry import wrap_rad
+from paani.map_origin import MapPlace, map_place_of
 from paani.messages import (
     Advisory,
     AisVessels,
@@ -82,7 +83,7 @@ class NavigatorState(
     `is_ordered`: an order of a mode was heard. Of HOLD or RETURN: `errand` is how far that has come, `errand_ilos` its
     integral, `errand_since_us` when it was ordered. `progress` and `ilos` are those of the mission throughout.
     `legs_us`: stamp of the legs that they count for. `station`: where the boat is kept while it stops.
-    `headway`: that along its path.
+    `headway`: that along its path. `map_place`: by which the map is known that mission and fence lie in.
     """
 
     progress: MissionProgress = MissionProgress()
@@ -99,6 +100,7 @@ class NavigatorState(
     legs_us: int = 0
     station: Station | None = None
     headway: Headway = Headway()
+    map_place: MapPlace | None = None
 
 
 def navigate(
@@ -201,7 +203,8 @@ def begin_step(
 ) -> tuple[NavigatorState, list[Inhibit]]:
     """What every mode begins with: the state with what this step shows, and what about the inputs forbids motion."""
     state = note_clock_advance(state, inputs, now_us)
-    inhibits = find_inhibits(inputs, state.clock_advanced_us, now_us, domain, config)
+    inhibits = find_inhibits(inputs, state.clock_advanced_us, state.map_place, now_us, domain, config)
+    state = msgspec.structs.replace(state, map_place=state.map_place or map_place_of(inputs.odometry))
     if _is_more_than_advice(inhibits):
         state = msgspec.structs.replace(state, station=None)  # it lies by dead reckoning, which may have begun anew
     state = _end_visual_turn(state, inputs)

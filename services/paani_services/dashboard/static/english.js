@@ -183,7 +183,7 @@ export const STOP_REASONS = {
   ADVISED_NO_DATA: "the advisor has no evidence",
   TURN_CAPPED: "turned as far as allowed without finding a clear direction",
   NO_FREE_PATH: "no trajectory is known to be free",
-  NO_ROUTE: "no route",
+  NO_ROUTE: "no route", MAP_MOVED: "the map begins elsewhere since localization began anew: start PAANI anew",
   ROUTE_FINISHED: "route finished",
   HOLDING: "holding station",
   MISSION_DONE: "mission done",

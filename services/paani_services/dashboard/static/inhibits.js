@@ -17,7 +17,7 @@ const TOPICS = [
 /** The stage that an inhibit speaks of; the navigator and the controller only pass it on. @type {Record<string, string>} */
 const STAGE_OF_INHIBIT = {
   NO_ADVISORY: "advisor", STALE_ADVISORY: "advisor", ADVISED_STOP: "advisor", ADVISED_NO_DATA: "advisor", BLOCKED_AHEAD: "advisor",
-  NO_ODOMETRY: "localization", STALE_ODOMETRY: "localization", UNHEALTHY_ODOMETRY: "localization",
+  NO_ODOMETRY: "localization", STALE_ODOMETRY: "localization", UNHEALTHY_ODOMETRY: "localization", MAP_MOVED: "localization",
   NOT_ARMED: "operator", NO_ORDER: "operator", STALE_ORDER: "operator", IDLE: "operator", NEUTRAL: "operator",
   NO_ROUTE: "mission", ROUTE_FINISHED: "mission", HOLDING: "mission", MISSION_DONE: "mission",
   NO_FREE_PATH: "planner", TURN_CAPPED: "planner", OUTSIDE_FENCE: "fence",
