@@ -26,7 +26,10 @@ def position_sentences(odometry: m.Odometry | None) -> list[str]:
         return [sentence("RMC", "", "V", *[""] * 9, "N"), sentence("GGA", *[""] * 5, "0", *[""] * 8)]
     utc = datetime.fromtimestamp(odometry.source_us * 1e-6, UTC)
     time = f"{utc:%H%M%S}.{utc.microsecond // 10_000:02d}"
-    place = [*degrees_text(odometry.latitude_deg, "NS", 2), *degrees_text(odometry.longitude_deg, "EW", 3)]
+    place = [
+        *degrees_text(odometry.latitude_deg, "NS", 2),
+        *degrees_text(math.remainder(odometry.longitude_deg, 360.0), "EW", 3),
+    ]
     speed_mps = math.hypot(odometry.surge_mps, odometry.sway_mps)
     course_rad = odometry.yaw_rad + math.atan2(odometry.sway_mps, odometry.surge_mps)
     course = "" if odometry.stopped else _bearing_text(course_rad)
@@ -39,20 +42,26 @@ def position_sentences(odometry: m.Odometry | None) -> list[str]:
 
 
 def target_sentences(odometry: m.Odometry | None, prediction: m.Prediction | None) -> list[str]:
-    """A TTM for each moving obstacle: true bearing, distance [nautical miles], course and speed [knots] over ground."""
+    """A TTM for each moving obstacle: true bearing, distance [nautical miles], course and speed [knots] over ground.
+
+    Its number has the last two digits of its track, or the next that no other of them has.
+    """
     if odometry is None or not odometry.healthy or prediction is None:
         return []
-    lines = []
+    lines, numbers = [], set[int]()
     for obstacle in prediction.obstacles[:MAX_TARGETS]:
+        number = (
+            next(each for each in range(obstacle.track_id, obstacle.track_id + 100) if each % 100 not in numbers) % 100
+        )
+        numbers.add(number)
         east_m, north_m = obstacle.x_m - odometry.x_m, obstacle.y_m - odometry.y_m
         distance = f"{math.hypot(east_m, north_m) / METRES_PER_NAUTICAL_MILE:.4f}"
         bearing = _bearing_text(math.atan2(north_m, east_m))
         speed = f"{math.hypot(obstacle.east_mps, obstacle.north_mps) * KNOTS_PER_MPS:.2f}"
         course = _bearing_text(math.atan2(obstacle.north_mps, obstacle.east_mps))
-        number, status = f"{obstacle.track_id % 100:02d}", "T" if obstacle.age_s < 1.0 else "Q"  # tracked, or doubtful
-        lines.append(
-            sentence("TTM", number, distance, bearing, "T", speed, course, "T", "", "", "N", "", status, "", "", "A")
-        )
+        status = "T" if obstacle.age_s < 1.0 else "Q"  # tracked, or doubtful
+        motion = (speed, course, "T", "", "", "N", "", status, "", "", "A")
+        lines.append(sentence("TTM", f"{number:02d}", distance, bearing, "T", *motion))
     return lines
 
 

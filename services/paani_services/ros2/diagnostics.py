@@ -84,7 +84,7 @@ class Diagnostics:
 
     def _newest(self, name: str, now_us: int) -> Any | None:
         received_us, message = self._heard.get(name, (0, None))
-        return message if message is not None and now_us - received_us <= self._fresh_s[name] * 1e6 else None
+        return message if message is not None and 0 <= now_us - received_us <= self._fresh_s[name] * 1e6 else None
 
     def _motion(self, now_us: int) -> Status:
         """Whether thrust is applied, and why not."""

@@ -92,3 +92,19 @@ def test_a_target_by_bearing_distance_and_motion() -> None:
     assert ttm.targetstatus == "T"  # type: ignore[attr-defined]
     unseen = target_sentences(odometry(), m.Prediction(source_us=AT_US, obstacles=(obstacle(age_s=1.5),)))[0]
     assert read([unseen])["TTM"].targetstatus == "Q"  # type: ignore[attr-defined]
+
+
+@given(st.lists(st.integers(0, 1000), max_size=120))
+def test_no_two_targets_have_one_number(track_ids: list[int]) -> None:
+    """What is known by AIS alone has no track, and tracks go on beyond 99."""
+    found = m.Prediction(source_us=AT_US, obstacles=tuple(obstacle(track_id=each) for each in track_ids))
+    lines = target_sentences(odometry(), found)
+    numbers = [line.split(",")[1] for line in lines]
+    assert len(numbers) == len(set(numbers)) == min(len(track_ids), 99)
+    if track_ids:
+        assert int(numbers[0]) == track_ids[0] % 100
+
+
+@pytest.mark.parametrize(("longitude_deg", "text"), [(180.001, "17959.94000,W"), (-180.001, "17959.94000,E")])
+def test_a_place_beyond_the_antimeridian_has_its_own_longitude(longitude_deg: float, text: str) -> None:
+    assert text in position_sentences(odometry(longitude_deg=longitude_deg))[0]

@@ -68,6 +68,7 @@ def test_silence_is_stale_after_the_time_of_the_table() -> None:
     diagnostics.note(keys.THRUST_APPLIED.name, applied(m.ZeroCause.NONE), NOW_US)
     assert report(diagnostics, NOW_US + fresh_us)["motion"].level == OK
     assert report(diagnostics, NOW_US + fresh_us + 1)["motion"].level == STALE
+    assert report(diagnostics, NOW_US - 1)["motion"].level == STALE  # the clock was set back: its age is none
 
 
 def test_picture_and_position() -> None:
