@@ -13,7 +13,7 @@ from paani import messages as m
 from paani.geometry import geodetic_from_enu
 from paani.map_origin import map_origin_deg
 from paani_services.mavlink.codec import dialect
-from paani_services.mavlink.fields import degrees_e7
+from paani_services.mavlink.fields import U16_MAX, degrees_e7
 from paani_services.mavlink.mission_items import Item, Legs
 from paani_services.mavlink.rover_modes import Mode, mode_of
 from paani_services.mavlink.snapshot import Snapshot
@@ -135,7 +135,9 @@ def mission_current(snapshot: Snapshot, plan: Plan) -> Any:
     """How far the mission is."""
     inhibits = snapshot.command.inhibits if snapshot.command is not None else ()
     is_done = m.Inhibit.MISSION_DONE in inhibits or m.Inhibit.ROUTE_FINISHED in inhibits
-    total = len(plan.items[MISSION])
+    items = plan.items[MISSION]
+    has_home = bool(items) and (items[0].command, items[0].frame) == (WAYPOINT, GLOBAL)
+    total = len(items) - has_home  # the protocol does not count home
     is_route = mode_of(snapshot) is Mode.AUTO
     if snapshot.command is None:
         state = dialect.MISSION_STATE_UNKNOWN
@@ -148,4 +150,4 @@ def mission_current(snapshot: Snapshot, plan: Plan) -> Any:
     else:
         state = dialect.MISSION_STATE_PAUSED
     mode = IN_MISSION if is_route else SUSPENDED
-    return dialect.MAVLink_mission_current_message(current_seq(snapshot, plan), total, state, mode)
+    return dialect.MAVLink_mission_current_message(current_seq(snapshot, plan), total or U16_MAX, state, mode)

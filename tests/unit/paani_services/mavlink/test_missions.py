@@ -125,7 +125,11 @@ def test_how_far_the_mission_is() -> None:
     assert state(armed(command=done)) == common.MISSION_STATE_COMPLETE
     assert state(armed(command=None)) == common.MISSION_STATE_UNKNOWN
     assert mission_current(armed(), EMPTY).mission_state == common.MISSION_STATE_NO_MISSION
-    assert mission_current(armed(), plan()).total == 10
+    home_alone = plan_of(in_order(mission=m.Mission(source_us=NOW_US, name="", legs=()), prediction=KNOWN_HOME))
+    for nothing in (EMPTY, home_alone):
+        current = mission_current(armed(), nothing)
+        assert (current.total, current.mission_state) == (65_535, common.MISSION_STATE_NO_MISSION)
+    assert mission_current(armed(), plan()).total == 9  # home is none of them
 
 
 @pytest.mark.parametrize("seq", [-1, 10, 65_535])
