@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 from paani.errors import UserError
+from paani.option_numbers import quantity
 from paani_models.datasets import inventory, mastr1325, waterscenes
 from paani_models.datasets.manifest import count_boxes, format_counts_table
 from paani_models.datasets.pack import WEIGHTS_FOLDER, pack_bundle
@@ -29,7 +30,8 @@ def add_prepare_arguments(parser: argparse.ArgumentParser) -> None:
 def add_pack_arguments(parser: argparse.ArgumentParser) -> None:
     """Beside --data, --sources and --rendered."""
     parser.add_argument("--out", type=Path, required=True, help="the tar file")
-    parser.add_argument("--max-mb", type=float, default=60.0, help="its largest size, in millions of bytes")
+    size_mb = quantity("MB", high=1e6)
+    parser.add_argument("--max-mb", type=size_mb, default=60.0, help="its largest size, in millions of bytes")
     parser.add_argument("--start", type=Path, action="append", default=[], help="checkpoint to add, repeatable")
 
 

@@ -72,7 +72,8 @@ class Intake:
             (self.out / entry.label).write_text(format_labels(boxes), encoding="ascii")
         if mask is not None:
             (self.out / "masks").mkdir(exist_ok=True)
-            cv2.imwrite(str(self.out / entry.mask), mask)
+            if not cv2.imwrite(str(self.out / entry.mask), mask):
+                raise UserError(f"{self.out / entry.mask}: cannot be written (is the disk full?)")
         self.entries.append(entry)
         self.fingerprints.append(
             fingerprint_picture(

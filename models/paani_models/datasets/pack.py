@@ -86,6 +86,10 @@ def pack_bundle(
     folders = {source.folder: folder_of(source) for source in dict.fromkeys(s.source for s in samples)}
     pictures = {s.picture: s.source for s in samples}
     other = dict(_other_files(pictures, folders, samples))
+    for option, paths in (("--weights", weights), ("--start", start)):
+        names_given = [path.name for path in paths]
+        if twice := next((name for name in names_given if names_given.count(name) > 1), ""):
+            raise UserError(f"{option}: two files are called {twice}")
     other |= {f"{WEIGHTS_FOLDER}/{path.name}": read_whole_file(path) for path in weights}
     other |= {f"{START_FOLDER}/{path.name}": read_whole_file(path) for path in start}
     names = {

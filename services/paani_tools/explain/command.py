@@ -84,7 +84,7 @@ def _utc_us(text: str, log: Log) -> int:
             moment = moment.replace(tzinfo=moment.tzinfo or datetime.UTC)
         else:
             clock = datetime.time.fromisoformat(text.removesuffix("Z"))
-            moment = datetime.datetime.combine(start.date(), clock, datetime.UTC)
+            moment = datetime.datetime.combine(start.date(), clock, clock.tzinfo or datetime.UTC)
     except ValueError as error:
         raise UserError(f"--at {text}: expected seconds since the start, or a time like 12:30:05") from error
     at_us = round(moment.timestamp() * 1e6)

@@ -74,8 +74,9 @@ def moment_at(log: Log, at_us: int) -> Moment:
     order = _first(o for _, o in found[keys.COMMAND.name] if o.advisory_sent_us == advisory.sent_us)
     thrust = _first(t for _, t in found[keys.THRUST.name] if order and t.command_sent_us == order.sent_us)
     applied = _first(a for _, a in found[keys.THRUST_APPLIED.name] if thrust and a.command_sent_us == thrust.sent_us)
-    if applied is None:  # an adapter that takes no order shows none
-        applied = _first(a for at, a in found[keys.THRUST_APPLIED.name] if at > log_us)
+    if applied is None:  # an adapter that takes no order shows none; thrust that it applies is another order's
+        after = (a for at, a in found[keys.THRUST_APPLIED.name] if at > log_us)
+        applied = _first(a for a in after if a.zero_cause is not m.ZeroCause.NONE)
     pictures = list(_pictures(log, frame, log_us))
     return Moment(
         at_us=log_us,

@@ -107,6 +107,21 @@ def test_weights_and_a_start_travel_along(tmp_path: Path, capsys: pytest.Capture
     assert (there / "_start" / "best.pt").read_bytes() == b"start"
 
 
+def test_two_starts_of_one_name_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    data = own_data(tmp_path / "data")
+    arguments = ["pack", "--data", str(data), "--sources", ",".join(NAMES), "--out", str(tmp_path / "b.tar")]
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "best.pt").write_bytes(b"start")
+        arguments += ["--start", str(tmp_path / folder / "best.pt")]
+    assert main(arguments) == 2
+    assert "--start: two files are called best.pt" in capsys.readouterr().err
+    assert not (tmp_path / "b.tar").exists()
+    with pytest.raises(SystemExit):
+        main([*arguments[:-2], "--max-mb", "nan"])
+    assert "--max-mb" in capsys.readouterr().err
+
+
 def test_terms_travel_along(tmp_path: Path) -> None:
     there = unpack(packed(own_data(tmp_path / "data"), tmp_path / "b.tar"), tmp_path / "there")
     text = (there / "mcoe_boats" / "manifest.json").read_text()

@@ -215,6 +215,14 @@ def test_a_boat_that_is_held_says_why(
     assert "applies zero: pulse lost (eye)" in out
 
 
+def test_thrust_that_another_order_gave_is_not_that_of_this_one(tmp_path: Path) -> None:
+    applied = m.ThrustApplied(
+        source_us=T0_US, left=0.1, right=0.1, left_n=7.5, right_n=7.5, zero_cause=m.ZeroCause.NONE, command_sent_us=1
+    )
+    other = Record(keys.THRUST_APPLIED.name, T0_US + 8_500_000, 0, msgspec.json.encode(applied))
+    assert moment_at(open_log(write_log(tmp_path / "a.mcap", [*DRIVE, other])), T0_US + 8_000_000).applied is None
+
+
 def test_the_picture_is_drawn(capsys: pytest.CaptureFixture[str], log: Path, tmp_path: Path) -> None:
     out = tmp_path / "p.png"
     code, _, _ = paani(capsys, "explain", log, "--at", "8", "--picture", out)
@@ -265,5 +273,7 @@ def test_times_are_seconds_or_utc(log: Path) -> None:
     assert time_us("5.5", opened) == opened.start_us + 5_500_000
     assert abs(time_us(later.strftime("%H:%M:%S"), opened) - whole) <= 1_000_000
     assert abs(time_us(later.strftime("%Y-%m-%dT%H:%M:%SZ"), opened) - whole) <= 1_000_000
+    there = later.astimezone(datetime.timezone(datetime.timedelta(hours=1)))
+    assert abs(time_us(there.strftime("%H:%M:%S+01:00"), opened) - whole) <= 1_000_000
     earlier = start - datetime.timedelta(hours=1)
     assert time_us(earlier.strftime("%H:%M:%S"), opened) > opened.end_us  # after midnight
