@@ -89,7 +89,7 @@ def info_of(log: Log, seen: Callable[[Record], None] = lambda record: None) -> L
             channels[record.topic] = ChannelTimes(record.log_us)
         if record.topic == keys.ADVISORY.name:
             directions.take(record.data)
-    duration_s = (log.end_us - log.start_us) * 1e-6
+    duration_s = sum(end_us - start_us for start_us, end_us in log.recordings) * 1e-6  # not what lies between them
     lost = log.metadata_by_part("recorder")
     return LogInfo(
         path=str(log.path),

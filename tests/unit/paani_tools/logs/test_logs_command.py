@@ -16,7 +16,7 @@ from paani.cli import main
 from paani.logs.reader import open_log
 from paani.logs.writer import LogWriter
 from paani_tools.logs.info import DirectionChanges
-from tests.unit.paani.logs.small_logs import NAME, START_US, about, finished, unfinished
+from tests.unit.paani.logs.small_logs import NAME, START_US, about, finished, put, unfinished
 
 ONE = "20231114T221320Z-1.mcap"
 
@@ -170,3 +170,27 @@ def test_mistakes_are_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert "no track in it" in refused(capsys, "export", none, "--geojson", tmp_path / "t.geojson")
     assert not (tmp_path / "t.geojson").exists()
     assert sorted(file.name for file in tmp_path.iterdir()) == [NAME, none.name, "empty"]
+
+
+def advised(folder: Path, name: str, from_us: int) -> None:
+    """A drive of 60 s whose direction changes every ten, with the part number of a first file."""
+    log = LogWriter(folder / name, about(), keys.every_topic(), from_us)
+    for number in range(301):
+        direction = m.Direction.LEFT if number // 50 % 2 else m.Direction.RIGHT
+        at_us = from_us + number * 200_000
+        advisory = m.Advisory(
+            source_us=at_us, sent_us=at_us, seq=number, direction=direction, reason=m.Reason.CENTER_RISK
+        )
+        put(log, keys.ADVISORY, advisory)
+    log.finish({})
+
+
+def test_two_drives_in_one_folder_last_as_long_as_both(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The day between them is no part of either."""
+    advised(tmp_path, ONE, START_US)
+    alone = json.loads(output_of(capsys, "info", tmp_path, "--json"))
+    advised(tmp_path, "20231115T221320Z-1.mcap", START_US + 86_400_000_000)
+    both = json.loads(output_of(capsys, "info", tmp_path, "--json"))
+    assert (alone["duration_s"], both["duration_s"]) == (60.0, 120.0)
+    assert alone["direction_changes_per_min"] == 6.0
+    assert both["direction_changes_per_min"] in {6.0, 6.5}  # with the change from one drive to the other
