@@ -19,7 +19,7 @@ from paani.bus import Bus, Latest, open_bus
 from paani.clock import Clock
 from paani.config import BusConfig
 from paani.operator_client import OperatorClient
-from paani_tools.fleet.vessel_state import Telemetry, VesselState, describe_vessel
+from paani_tools.fleet.vessel_state import TOPICS, Telemetry, VesselState, describe_vessel
 
 STOP_S = 2.0
 
@@ -56,19 +56,13 @@ class Vessel:
         """The row of this moment."""
         health = keys.health("").name
 
-        def newest(topic: keys.Topic[Any]) -> Any:
-            inbox = self._latest.get(topic.name)
-            return None if inbox is None else inbox.value
-
+        heard = {name: self._latest[topic.name] for name, topic in TOPICS.items() if topic.name in self._latest}
         return describe_vessel(
             self.name,
             Telemetry(
                 age_s=min((inbox.receipt_age_s() for inbox in self._latest.values()), default=math.inf),
-                odometry=newest(keys.ODOMETRY),
-                advisory=newest(keys.ADVISORY),
-                command=newest(keys.COMMAND),
-                operator=newest(keys.OPERATOR_STATE),
-                applied=newest(keys.THRUST_APPLIED),
+                ages_s={name: inbox.receipt_age_s() for name, inbox in heard.items()},
+                **{name: inbox.value for name, inbox in heard.items()},
                 health={
                     name.removeprefix(health): (inbox.value, inbox.receipt_age_s())
                     for name, inbox in self._latest.items()

@@ -5,9 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from enum import StrEnum
+from types import MappingProxyType
+from typing import Any
 
 import msgspec
 
+from paani import keys
 from paani import messages as m
 
 STALE_S = 1.0  # position and thrust come twenty times a second: what is older tells of the past
@@ -72,10 +75,22 @@ class VesselState(msgspec.Struct, frozen=True, kw_only=True):
         return "STOPPED" if self.stopped else "armed" if self.armed else "disarmed"
 
 
+TOPICS: Mapping[str, keys.Topic[Any]] = MappingProxyType(
+    {
+        "odometry": keys.ODOMETRY, "advisory": keys.ADVISORY, "command": keys.COMMAND,
+        "operator": keys.OPERATOR_STATE, "applied": keys.THRUST_APPLIED,
+    }
+)  # fmt: skip
+
+
 class Telemetry(msgspec.Struct, frozen=True, kw_only=True):
-    """The newest message of each kind, None before the first. health: by process, with its age [s]."""
+    """The newest message of each of `TOPICS`, None before the first. health: by process, with its age [s].
+
+    age_s: of the newest of all. ages_s: of each, by its name in `TOPICS`; what is not there is as new as that.
+    """
 
     age_s: float
+    ages_s: Mapping[str, float] = {}
     odometry: m.Odometry | None = None
     advisory: m.Advisory | None = None
     command: m.NavCommand | None = None
@@ -85,7 +100,7 @@ class Telemetry(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def describe_vessel(name: str, telemetry: Telemetry) -> VesselState:
-    """The row of a vessel."""
+    """The row of a vessel. What had fallen silent before anything else was heard is not known any more."""
     if math.isinf(telemetry.age_s):
         return VesselState(name=name, contact=Contact.AWAY)
     state = VesselState(
@@ -96,6 +111,8 @@ def describe_vessel(name: str, telemetry: Telemetry) -> VesselState:
         silent=tuple(sorted(who for who, (_, age_s) in telemetry.health.items() if age_s > HEALTH_STALE_S)),
         unready=tuple(sorted(who for who, (report, _) in telemetry.health.items() if not report.ready)),
     )
+    is_silent = {name: telemetry.ages_s.get(name, 0.0) > telemetry.age_s + TOPICS[name].fresh_s for name in TOPICS}
+    telemetry = msgspec.structs.replace(telemetry, **{name: None for name in TOPICS if is_silent[name]})
     changes: dict[str, object] = {}
     if (pose := telemetry.odometry) is not None:
         changes |= {name: getattr(pose, name) for name in ("x_m", "y_m", "latitude_deg", "longitude_deg", "yaw_rad")}

@@ -56,3 +56,12 @@ def test_what_was_heard_is_in_the_row() -> None:
     for text in ("STOPPED by shore", "3.0, -4.0 (not to be trusted)", "0.50", "+0.50 -0.25", "NOT_ARMED, NO_ROUTE"):
         assert text in line
     assert line.endswith("plant silent, eye not ready")
+
+
+def test_what_fell_silent_before_the_rest_is_not_told_as_of_now() -> None:
+    """Of a vessel that is out of reach as a whole, what was known last stays, and its age is told."""
+    for age_s in (0.1, 3600.0):
+        ages_s = {"odometry": age_s + 3600.0, "operator": age_s}
+        state = describe_vessel("otter", Telemetry(age_s=age_s, ages_s=ages_s, odometry=POSE, operator=STOPPED))
+        assert (state.x_m, state.speed_mps, state.mode) == (None, None, "STOPPED")
+    assert describe_vessel("otter", Telemetry(age_s=3600.0, ages_s={"odometry": 3600.0}, odometry=POSE)).x_m == 3.0
