@@ -36,6 +36,7 @@ YAW_STD_RAD = 0.02  # compass noise of one step
 YAW_GATE2 = 9.0  # validation gate of the compass, squared sigmas: at 20 Hz a refusal costs little
 COMPASS_BIAS_STD_RAD = 0.05  # at start, 3 degrees: an adjusted small compass on a small boat
 COMPASS_DOUBT_S, COMPASS_DOUBT_RAD = 1.0, 0.1  # refused for so long, compass or gyro has changed by about so much
+HEADING_DOUBT_S = 1.1  # of refusals, less what was accepted: more than a step of the compass takes to be followed
 MAX_COMPASS_BIAS_RAD = (
     0.35  # 20 degrees; what seems to be farther off is a gyro that turns wrongly, or a broken compass
 )
@@ -88,7 +89,7 @@ class Estimator:
         self._agreeing_refusals_m: list[tuple[float, float]] = []  # the latest refused fixes, as long as they agree
         self._refused_total = 0
         self._refused_speeds = 0
-        self._compass_refused_s = self._compass_accepted_s = 0.0
+        self._compass_refused_s = self._disagreement_s = 0.0
         self._is_heading_doubted = False
         self._noise_frac2 = GPS_NOISE_FRAC**2
         self._noise_fixes = FIRST_NOISE_FIXES
@@ -152,16 +153,20 @@ class Estimator:
     def _correct_heading(self, global_filter: PlanarFilter, yaw_rad: float, step_s: float) -> None:
         """Correct with the compass; where it is refused for long, doubt heading and compass: the course decides.
 
-        Which of gyro and compass is wrong is not known then, nor is the heading, until they agree for as long.
+        Where that does not reconcile them, which of the two is wrong is not known, nor is the heading, until it is
+        accepted for as long as it was refused.
         """
-        if global_filter.correct_yaw(yaw_rad, YAW_STD_RAD, YAW_GATE2).is_accepted:
-            self._compass_refused_s, self._compass_accepted_s = 0.0, self._compass_accepted_s + step_s
-            self._is_heading_doubted &= self._compass_accepted_s < COMPASS_DOUBT_S
+        is_accepted = global_filter.correct_yaw(yaw_rad, YAW_STD_RAD, YAW_GATE2).is_accepted
+        self._disagreement_s = clip(self._disagreement_s + (-step_s if is_accepted else step_s), 0.0, HEADING_DOUBT_S)
+        doubted_from_s = 0.0 if self._is_heading_doubted else HEADING_DOUBT_S - 1e-6
+        self._is_heading_doubted = self._disagreement_s > doubted_from_s
+        if is_accepted:
+            self._compass_refused_s = 0.0
             return
-        self._compass_refused_s, self._compass_accepted_s = self._compass_refused_s + step_s, 0.0
+        self._compass_refused_s += step_s
         if self._compass_refused_s >= COMPASS_DOUBT_S:
             global_filter.inflate_covariance(_std(psi=COMPASS_DOUBT_RAD, c=COMPASS_DOUBT_RAD))
-            self._compass_refused_s, self._is_heading_doubted = 0.0, True
+            self._compass_refused_s = 0.0
 
     def _bridge_imu_gap(self, gap_s: float) -> None:
         """Widen both filters by what the boat may have done in a gap of the IMU."""

@@ -192,7 +192,7 @@ def reversed_turns(sample: ImuSample) -> ImuSample:
 def test_a_gyro_that_contradicts_the_compass_is_believed_no_more_than_it(
     fault: Callable[[ImuSample], ImuSample],
 ) -> None:
-    """Compass and receiver are right: what is called healthy is no more than 25 degrees off, and seldom so."""
+    """Compass and receiver are right: what is called healthy is no more than 30 degrees off, and seldom so."""
     boat = EstimatedBoat()
     boat.change_samples = lambda samples: [fault(each) for each in samples]
     boat.sail(10.0)
@@ -203,9 +203,9 @@ def test_a_gyro_that_contradicts_the_compass_is_believed_no_more_than_it(
             estimate, steps = boat.global_estimate, steps + 1
             if estimate.healthy:
                 off_rad = abs(wrap_rad(estimate.yaw_rad - boat.yaw_rad))
-                assert off_rad < math.radians(25.0)
+                assert off_rad < math.radians(30.0)
                 healthy, wrong = healthy + 1, wrong + (off_rad > 3.0 * estimate.yaw_std_rad)
-    assert wrong <= 0.03 * steps
+    assert wrong <= 0.05 * steps
     assert healthy < 0.3 * steps
 
 
