@@ -8,6 +8,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from tests.places import ROOT
 
 APP = ROOT / "mcu/app"
@@ -37,6 +39,7 @@ def test_the_app_has_what_app_lab_looks_for() -> None:
     assert "platform: arduino:zephyr" in (APP / "sketch/sketch.yaml").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_the_linux_half_is_the_bridge_with_its_settings() -> None:
     """It gets as far as the bridge's own checks, which refuse the rate that the environment asks for."""
     finished = run_main(paths=os.pathsep.join(path for path in sys.path if path and Path(path).is_dir()))

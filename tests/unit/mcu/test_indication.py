@@ -83,6 +83,7 @@ def test_every_refusal_has_its_counter(core: Core, payload: bytes, verdict: McuV
     assert status.display is Direction.RIGHT
 
 
+@pytest.mark.slow
 def test_a_refusal_counter_stays_at_its_highest(core: Core) -> None:
     for _ in range(65_600):
         core.receive(INDICATION_LINE, b"\x93\x02\xabpaani_guide\x00")

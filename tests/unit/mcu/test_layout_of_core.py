@@ -39,6 +39,7 @@ def test_the_core_has_no_undefined_symbols(tmp_path: Path) -> None:
     assert subprocess.run(["nm", "-u", "core.o"], cwd=tmp_path, check=True, capture_output=True).stdout == b""
 
 
+@pytest.mark.slow
 def test_the_sketch_compiles_against_stubs_of_its_libraries() -> None:
     """Syntax and types alone: that it runs needs the board."""
     if not shutil.which("g++"):

@@ -87,6 +87,7 @@ def test_20_000_damaged_frames_and_none_acted_on(core: Core) -> None:
     assert core.status().refusals.framing > 1500
 
 
+@pytest.mark.slow
 def test_random_bytes_are_no_frames(core: Core) -> None:
     core.receive(0, random.Random(2).randbytes(1 << 20))
     core.receive(1, random.Random(3).randbytes(1 << 20))
@@ -221,6 +222,7 @@ def test_addresses_are_watched_and_both_builds_say_the_same() -> None:
     core.close()
 
 
+@pytest.mark.slow
 def test_the_watch_over_addresses_is_awake() -> None:
     script = Script()
     script.read_behind_memory()

@@ -35,6 +35,7 @@ def test_what_is_no_address_is_refused(address: str) -> None:
         cluster_address(address)
 
 
+@pytest.mark.slow
 def test_each_part_of_an_installation_counts() -> None:
     own = inspect_installation()
     assert explain_difference(own, own) == ""
@@ -47,6 +48,7 @@ def test_each_part_of_an_installation_counts() -> None:
         assert explain_difference(own, asked) == f"{library} {own.libraries[library]}, not 0.0"
 
 
+@pytest.mark.slow
 def test_a_worker_with_threads_is_refused() -> None:
     """Drives of one process would share OpenGL and settings of libraries."""
     own = inspect_installation()

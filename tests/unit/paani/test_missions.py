@@ -38,6 +38,7 @@ def line(count: int) -> tuple[Waypoint, ...]:
     return points(*((float(number), 0.0) for number in range(count)))
 
 
+@pytest.mark.slow
 def test_a_mission_that_can_be_sailed_has_no_fault() -> None:
     assert find_mission_fault(LEGS, (BASIN,), MARGIN_M) == ""
     assert find_mission_fault((), (), MARGIN_M) == ""

@@ -18,6 +18,7 @@ def rng() -> np.random.Generator:
 
 
 @pytest.mark.parametrize("name", [*FAULTS, *GEOMETRIC_FAULTS])
+@pytest.mark.slow
 def test_a_fault_is_a_picture_and_repeats(name: str) -> None:
     for severity in SEVERITIES:
         picture, mask = apply_fault(name, RIVER, MASK, severity, rng())

@@ -87,6 +87,7 @@ def test_what_is_no_number_is_treated_as_the_library_does() -> None:
     assert portable.log(math.inf) == math.inf
 
 
+@pytest.mark.slow
 def test_another_processor_gives_the_same_bits() -> None:
     digests = [
         subprocess.run(

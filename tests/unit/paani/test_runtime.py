@@ -44,6 +44,7 @@ def test_a_link_is_refused(tmp_path: Path) -> None:
         runtime_dir(BusConfig(runtime_dir=str(tmp_path / "link")))
 
 
+@pytest.mark.slow
 def test_a_latch_has_one_boat_and_a_killed_one_leaves_it(tmp_path: Path) -> None:
     config = BusConfig(runtime_dir=str(tmp_path / "runtime"))
     holds = (
@@ -70,6 +71,7 @@ def test_a_private_file_that_cannot_be_written_leaves_nothing_beside(tmp_path: P
     assert [path.name for path in tmp_path.iterdir()] == ["key"]
 
 
+@pytest.mark.slow
 def test_credentials_that_cannot_be_made_are_named_and_leave_nothing(tmp_path: Path) -> None:
     config = BusConfig(runtime_dir=str(tmp_path))
     (tmp_path / "credentials").touch()

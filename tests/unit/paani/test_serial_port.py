@@ -139,6 +139,7 @@ async def test_a_babbling_device_fills_a_bounded_queue_and_costs_no_cpu_unless_i
     assert (await port.read()).endswith(b"newest")
 
 
+@pytest.mark.slow
 async def test_a_device_that_takes_no_bytes_is_given_up(
     device: Device, port: Port, monkeypatch: pytest.MonkeyPatch
 ) -> None:

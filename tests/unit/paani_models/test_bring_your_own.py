@@ -87,6 +87,7 @@ def foreign(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_a_foreign_segmenter_is_checked_and_used(foreign: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Another size, another order of classes: declared in the manifest, understood by the check and by perception."""
     assert main(["models", "check", str(foreign)]) == 0
@@ -150,6 +151,7 @@ def test_a_detectors_manifest_states_a_row_for_each_class(tmp_path: Path) -> Non
         read_contract(tmp_path / "own.onnx", "detector")
 
 
+@pytest.mark.slow
 def test_a_detector_that_answers_with_no_number_moves_nothing(tmp_path: Path) -> None:
     """No box is not nobody: where none of its candidates is finite, nothing was looked for."""
     path = tmp_path / "own.onnx"
@@ -195,6 +197,7 @@ def test_dynamic_axes_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert "is not static" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_files_that_are_no_models(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Truncated, empty, foreign and missing files: one line that names the file, exit code 2."""
     whole = verified_path("segmenter").read_bytes()
@@ -208,6 +211,7 @@ def test_files_that_are_no_models(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert "none.onnx" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_detector_with_other_classes(tmp_path: Path) -> None:
     """Rows in another order, and rows that are left out: labels are those of the manifest."""
     path = tmp_path / "boats.onnx"

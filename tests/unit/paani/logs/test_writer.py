@@ -24,6 +24,7 @@ def messages(path: Path) -> list[tuple[Any, Any, Any]]:
         return list(make_reader(file, validate_crcs=True).iter_messages())
 
 
+@pytest.mark.slow
 def test_the_official_reader_reads_it_back_to_the_byte(tmp_path: Path) -> None:
     path = finished(tmp_path, 60)
     poses = [(schema, channel, one) for schema, channel, one in messages(path) if channel.topic == keys.ODOMETRY.name]

@@ -116,6 +116,7 @@ async def test_a_refusal_is_named(verdict: McuVerdict, problem: str) -> None:
         assert caller.problem == f"{caller.address}: {problem}"
 
 
+@pytest.mark.slow
 async def test_one_call_is_outstanding_at_a_time() -> None:
     peer = McuPeer()
     peer.delay_s = 0.02

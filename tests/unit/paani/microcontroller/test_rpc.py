@@ -60,6 +60,7 @@ def scan(pieces: list[bytes]) -> list[RpcMessage]:
 
 
 @given(st.lists(st.tuples(TEXT, MESSAGES), max_size=8), st.lists(st.integers(0, 2000), max_size=30))
+@pytest.mark.slow
 def test_every_message_is_found_whatever_the_cuts_and_the_text_between(
     stream: list[tuple[bytes, tuple[bytes, str]]], cuts: list[int]
 ) -> None:

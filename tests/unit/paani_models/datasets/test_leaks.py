@@ -53,6 +53,7 @@ def test_the_same_view_is_found(disguise: str) -> None:
         refuse_leaks([leak])
 
 
+@pytest.mark.slow
 def test_different_scenes_do_not_leak() -> None:
     pictures = [printed(scene(seed), f"{seed}", "train" if seed % 2 else "val") for seed in range(200)]
     assert find_leaks(pictures) == []

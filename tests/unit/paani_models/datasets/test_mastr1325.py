@@ -36,6 +36,7 @@ def test_official_codes_become_ours_r10() -> None:
     assert decode_mask_classes(to_file_codes(official)).tolist() == [1, 0, 2, 255, 255]
 
 
+@pytest.mark.slow
 def test_a_miniature_keeps_its_masks_r10(tmp_path: Path) -> None:
     manifest, _ = prepare_mastr1325(mastr1325(tmp_path / "raw"), tmp_path / "out")
     assert load_manifest(tmp_path / "out") == manifest
@@ -56,6 +57,7 @@ def test_whole_sequences_stay_together(tmp_path: Path) -> None:
     assert leaks == []
 
 
+@pytest.mark.slow
 def test_a_place_seen_again_is_one_sequence(tmp_path: Path) -> None:
     raw = mastr1325(tmp_path / "raw", (3, 3))
     write_picture(raw / "MaSTr1325_images_512x384" / "0007.jpg", scene(100, (512, 384)))
@@ -131,6 +133,7 @@ def test_what_is_wrong_is_named_and_nothing_is_half_written(name: str, tmp_path:
     assert [path.name for path in tmp_path.iterdir()] == ["raw"]
 
 
+@pytest.mark.slow
 def test_a_grey_mask_stored_in_three_channels_is_read(tmp_path: Path) -> None:
     raw = mastr1325(tmp_path / "raw")
     path = raw / "MaSTr1325_masks_512x384" / "0001m.png"

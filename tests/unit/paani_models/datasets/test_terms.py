@@ -57,6 +57,7 @@ def test_a_source_of_other_terms_beside_open_is_left_out(tmp_path: Path, capsys:
     assert "mcoe_boats: its terms do not let anyone use it" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_the_manifests_at_hand_state_the_terms_that_are_relied_on() -> None:
     if not data_folder().is_dir():
         pytest.skip(f"{data_folder()}: no such folder")

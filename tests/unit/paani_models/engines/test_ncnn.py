@@ -66,6 +66,7 @@ def test_outputs_of_both_engines_agree(segmenter: Path) -> None:
     assert other.info() == f"{one.info()} ncnn"
 
 
+@pytest.mark.slow
 def test_a_picture_is_perceived_by_ncnn(segmenter: Path, detector: Path) -> None:
     anything = ImageQualityConfig(max_endless=1.0)  # this segmenter sees water everywhere, which is no boat's view
     config = PerceptionConfig(engine="ncnn", segmenter=str(segmenter), detector=str(detector), image_quality=anything)
@@ -194,6 +195,7 @@ def test_convert_writes_what_the_engine_runs(tmp_path: Path, capsys: pytest.Capt
     ],
     ids=["failure", "layer", "difference", "not finite", "shape"],
 )
+@pytest.mark.slow
 def test_a_bad_conversion_leaves_nothing(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], param: str, weights: bytes, code: int, message: str
 ) -> None:

@@ -26,6 +26,7 @@ def picture(seed: int, overconfidence: float = OVERCONFIDENCE) -> tuple[np.ndarr
     return logits, (rng.random((64, 80)) > below).sum(0).astype(np.uint8).clip(0, 2)
 
 
+@pytest.mark.slow
 def test_the_temperature_is_found_and_lowers_the_error() -> None:
     counted = [count_cells(*picture(seed)) for seed in range(4)]
     found = calibrate(np.array([c.loss for c in counted]), np.array([c.bins for c in counted]), pictures=4)

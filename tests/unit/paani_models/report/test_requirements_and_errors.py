@@ -87,6 +87,7 @@ def test_the_best_answer_of_cells_loses_what_is_smaller_than_a_cell() -> None:
     assert (best[: height * 4 + 8] == SKY).all()
 
 
+@pytest.mark.slow
 def test_limits_are_added_per_source(tmp_path: Path) -> None:
     samples = PictureSelection(own_data(tmp_path), ["tbiseg_dasha"], None).segmented_samples(held_out=True)
     (limits,) = analyse_mask_errors(samples, lambda _picture, shape: np.zeros(shape[:2], np.uint8))

@@ -32,6 +32,7 @@ def scene() -> tuple[np.ndarray, np.ndarray]:
     ],
     ids=["glare", "jitter", "degrade", "null"],
 )
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bytes_s12(function: Callable[..., np.ndarray]) -> None:
     picture = scene()[0]
     pairs = [
@@ -41,6 +42,7 @@ def test_the_same_seed_gives_the_same_bytes_s12(function: Callable[..., np.ndarr
     assert len({a.tobytes() for a, _ in pairs}) > 1
 
 
+@pytest.mark.slow
 def test_glare_leaves_its_input_alone_and_brightens_the_dark_s8() -> None:
     picture = scene()[0]
     before = picture.copy()
@@ -110,6 +112,7 @@ def test_each_of_the_papers_augmentations_may_be_left_out_alone(left_out: str) -
         assert np.array_equal(none, picture)
 
 
+@pytest.mark.slow
 def test_the_papers_jitter_stays_within_its_ranges_s8() -> None:
     """Brightness and contrast by a fifth of a grey; hue by 0.05 of the circle and saturation by a fifth of a colour."""
     grey, n = np.full((8, 8, 3), 100, np.uint8), 400
@@ -150,6 +153,7 @@ def test_null_pictures_are_all_obstacle_and_of_many_kinds() -> None:
     assert max(means) > 235
 
 
+@pytest.mark.slow
 def test_a_pasted_patch_is_obstacle_and_nothing_else_changes() -> None:
     picture, mask = np.full((256, 320, 3), 30, np.uint8), np.zeros((256, 320), np.uint8)
     patch = np.full((60, 80, 3), 220, np.uint8)

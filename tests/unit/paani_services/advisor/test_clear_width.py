@@ -31,6 +31,7 @@ def advised(lanes: tuple[m.LaneEvidence, ...], detections: tuple[m.Detection, ..
     ids=["paper", "uncalibrated", "planned"],
 )
 @given(lanes=LANES, widths=st.tuples(SHARE, SHARE, SHARE), data=st.data())
+@pytest.mark.slow
 def test_e7_clear_width_never_gates(
     config: Config,
     boxes: tuple[m.Detection, ...],

@@ -110,6 +110,7 @@ def test_the_sets_are_exact_in_crowded_scenes(seed: int, tracks: int, size: int)
 
 @settings(max_examples=100, deadline=None)
 @given(scenes(5), st.integers(101, 200), st.floats(0.0, 0.02))
+@pytest.mark.slow
 def test_what_overlaps_no_corridor_is_left_out_without_loss(given_scene: Scene, number: int, x1: float) -> None:
     """A track beside every corridor changes no direction, alone or taken away with others."""
     beside = msgspec.structs.replace(
@@ -122,6 +123,7 @@ def test_what_overlaps_no_corridor_is_left_out_without_loss(given_scene: Scene, 
 
 @settings(max_examples=100, deadline=None)
 @given(scenes(6), CONFIGS)
+@pytest.mark.slow
 def test_crossing_the_nearest_limit_changes_the_direction(given_scene: Scene, config: Config) -> None:
     """Water alone is moved, since any number of tracks could be: a hair across the limit is another direction."""
     decision = given_scene.decided(config)
@@ -260,6 +262,7 @@ def test_the_work_is_bounded(tracks: int) -> None:
 
 @settings(max_examples=60, deadline=None)
 @given(scenes(24), CONFIGS)
+@pytest.mark.slow
 def test_it_is_the_same_every_time_and_survives_the_wire(given_scene: Scene, config: Config) -> None:
     found = why(given_scene, config)
     data = msgspec.json.encode(found)

@@ -99,6 +99,7 @@ def test_the_size_follows_the_range() -> None:
 @given(
     st.floats(-0.25, 0.25), st.floats(-0.3, 0.3), st.floats(-0.1, 0.1), st.floats(-0.06, 0.06), st.floats(-0.06, 0.06)
 )
+@pytest.mark.slow
 def test_turned_boxes_lie_where_the_camera_sees_them(
     bearing: float, yaw_rad: float, before_roll: float, now_roll: float, pitch_rad: float
 ) -> None:

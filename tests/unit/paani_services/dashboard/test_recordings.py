@@ -26,6 +26,7 @@ def refusal(folder: RecordingFolder, name: str) -> tuple[int, str]:
     return caught.value.status, str(caught.value)
 
 
+@pytest.mark.slow
 def test_the_list_says_what_each_is(tmp_path: Path) -> None:
     finished(tmp_path)
     (tmp_path / "notes.mcap").write_bytes(b"not a recording of ours")
@@ -43,6 +44,7 @@ def test_the_list_says_what_each_is(tmp_path: Path) -> None:
     assert not folder.list().recordings[0].running
 
 
+@pytest.mark.slow
 def test_what_is_protected_or_being_written_is_not_deleted(tmp_path: Path) -> None:
     path, log = finished(tmp_path), begin(tmp_path, LATER)
     folder = RecordingFolder(str(tmp_path))

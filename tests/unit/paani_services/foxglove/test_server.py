@@ -57,6 +57,7 @@ def test_a_file_that_is_no_certificate_is_named(tmp_path: Path) -> None:
     assert read_pem(FoxgloveConfig()) is None
 
 
+@pytest.mark.slow
 async def test_with_a_certificate_nothing_goes_out_in_clear(tmp_path: Path) -> None:
     """A client that trusts the certificate is served; one that does not, or speaks in clear, is not."""
     file = tmp_path / "boat.pem"

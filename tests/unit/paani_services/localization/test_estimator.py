@@ -39,6 +39,7 @@ def test_l2_l3_follows_the_boat_in_the_map(boat: EstimatedBoat) -> None:
     assert (estimate.latitude_deg, estimate.longitude_deg) == pytest.approx(here)
 
 
+@pytest.mark.slow
 def test_l1_local_estimate_is_smooth_and_ignores_gps(boat: EstimatedBoat) -> None:
     """L1: a jump of the receiver does not reach the local frame; what the gyro measures does, without delay."""
     before = boat.local_estimate
@@ -65,6 +66,7 @@ def test_without_fixes_the_estimate_is_unhealthy() -> None:
     assert not any(one.healthy for one in boat.sail(6.0))
 
 
+@pytest.mark.slow
 def test_stale_gps_and_stale_imu_are_unhealthy_and_recover(boat: EstimatedBoat) -> None:
     boat.gps = False
     boat.sail(2.5)
@@ -80,6 +82,7 @@ def test_stale_gps_and_stale_imu_are_unhealthy_and_recover(boat: EstimatedBoat) 
     assert not boat.local_estimate.healthy
 
 
+@pytest.mark.slow
 def test_a_new_imu_epoch_starts_anew(boat: EstimatedBoat) -> None:
     """A plant that restarts may have its boat elsewhere: nothing of the old estimate is kept."""
     boat.epoch, boat.x_m = 1, -200.0
@@ -97,6 +100,7 @@ def test_a_single_outlier_fix_is_refused(boat: EstimatedBoat) -> None:
     assert boat.global_estimate.healthy
 
 
+@pytest.mark.slow
 def test_l5_stopped_flag(boat: EstimatedBoat) -> None:
     """L5: set after 2 s below 0.05 m/s, cleared at once when the boat moves."""
     boat.sail(6.0)
@@ -106,6 +110,7 @@ def test_l5_stopped_flag(boat: EstimatedBoat) -> None:
 
 
 @pytest.mark.parametrize("surge_mps", [0.0, 0.04, 0.07])
+@pytest.mark.slow
 def test_l5_a_boat_is_stopped_after_two_seconds_below_0_05_mps(boat: EstimatedBoat, surge_mps: float) -> None:
     """L5: by the estimated speed of every step, of a boat that slows down to this speed."""
     boat.sail(3.0, surge_mps=0.4)
@@ -120,6 +125,7 @@ def test_l5_a_boat_is_stopped_after_two_seconds_below_0_05_mps(boat: EstimatedBo
     assert any(flags) is (surge_mps < 0.05)
 
 
+@pytest.mark.slow
 def test_gyro_bias_is_estimated_at_rest(boat: EstimatedBoat) -> None:
     rates = [one.yaw_rate_radps for one in boat.sail(2.0)]
     assert statistics.fmean(rates) == pytest.approx(0.0, abs=6e-4)
@@ -160,6 +166,7 @@ def test_a12_without_heading_there_is_no_health() -> None:
     assert not any(one.healthy for one in boat.sail(60.0, surge_mps=0.6))
 
 
+@pytest.mark.slow
 def test_a12_a_compass_that_falls_silent_ends_health(boat: EstimatedBoat) -> None:
     """A12: the gyro keeps the heading for 3 s, no longer."""
     boat.sail(10.0, surge_mps=0.6)
@@ -209,6 +216,7 @@ def test_a_gyro_that_contradicts_the_compass_is_believed_no_more_than_it(
     assert healthy < 0.3 * steps
 
 
+@pytest.mark.slow
 def test_of_samples_after_a_stall_the_gap_before_them_counts_not_their_number(boat: EstimatedBoat) -> None:
     """A process that was held up for five seconds finds the newest samples alone, as many as its queue holds."""
     kept = deque[ImuSample](maxlen=64)
@@ -222,6 +230,7 @@ def test_of_samples_after_a_stall_the_gap_before_them_counts_not_their_number(bo
 
 
 @pytest.mark.parametrize("late", [0, 2, 4])
+@pytest.mark.slow
 def test_a_late_fix_says_where_the_boat_was(late: int) -> None:
     """A receiver that hands out its fixes 0.4 or 0.8 s later shifts a boat at 1 m/s by a third of that at most.
 
@@ -257,6 +266,7 @@ def test_a_fix_from_another_time_than_the_imu_s_is_dropped_and_counted(boat: Est
 
 
 @pytest.mark.parametrize("gap_s", [1.0, 3.0])
+@pytest.mark.slow
 def test_what_the_imu_saw_before_a_gap_does_not_say_that_the_boat_lies_still_after_it(
     boat: EstimatedBoat, gap_s: float
 ) -> None:
@@ -292,6 +302,7 @@ def test_first_fix_is_the_origin_when_none_is_set() -> None:
     assert math.hypot(boat.global_estimate.x_m, boat.global_estimate.y_m) < 1.5
 
 
+@pytest.mark.slow
 def test_a_boat_that_has_moved_is_not_moored_because_its_imu_began_anew(boat: EstimatedBoat) -> None:
     """Adrift, too slowly for the receiver to tell: only that it never moved says that a boat lies still."""
     boat.sail(4.0, surge_mps=0.6)

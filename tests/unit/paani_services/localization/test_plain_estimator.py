@@ -44,6 +44,7 @@ def test_l3_position_of_gps_and_heading_of_the_imu(boat: EstimatedBoat) -> None:
     assert 0.0 < estimate.nis < 20.0
 
 
+@pytest.mark.slow
 def test_l3_without_speed_over_ground_the_estimate_is_the_same(boat: EstimatedBoat) -> None:
     """L3: of a fix the position alone is used."""
     other = EstimatedBoat(PLAIN)
@@ -55,12 +56,14 @@ def test_l3_without_speed_over_ground_the_estimate_is_the_same(boat: EstimatedBo
     )
 
 
+@pytest.mark.slow
 def test_l3_a_compass_that_is_off_turns_the_estimate_by_as_much(boat: EstimatedBoat) -> None:
     boat.compass_bias_rad = 0.3
     boat.sail(5.0, surge_mps=0.5)
     assert boat.global_estimate.yaw_rad - boat.yaw_rad == pytest.approx(0.3, abs=0.05)
 
 
+@pytest.mark.slow
 def test_a_receiver_that_jumps_is_followed_and_believed(boat: EstimatedBoat) -> None:
     """What the augmented filter refuses: the paper's has no gate."""
     ours = EstimatedBoat(CONFIG)
@@ -87,6 +90,7 @@ def test_l5_a_boat_at_rest_seems_to_move_as_its_receivers_error_does() -> None:
     assert moving[1] < 0.02
 
 
+@pytest.mark.slow
 def test_l5_the_stopped_flag_follows_the_speed(boat: EstimatedBoat) -> None:
     slow_since_us, flags = None, []
     for estimate in boat.sail(8.0) + boat.sail(5.0, surge_mps=0.5):
@@ -99,6 +103,7 @@ def test_l5_the_stopped_flag_follows_the_speed(boat: EstimatedBoat) -> None:
     assert not flags[-1]
 
 
+@pytest.mark.slow
 def test_l1_the_local_estimate_has_no_fix_in_it(boat: EstimatedBoat) -> None:
     """L1: neither a jump of the receiver nor its silence reaches it; its heading is the IMU's."""
     silent = EstimatedBoat(PLAIN)
@@ -112,6 +117,7 @@ def test_l1_the_local_estimate_has_no_fix_in_it(boat: EstimatedBoat) -> None:
     assert boat.local_estimate.yaw_rad == pytest.approx(boat.yaw_rad, abs=0.05)
 
 
+@pytest.mark.slow
 def test_what_is_stale_is_unhealthy_until_it_comes_again(boat: EstimatedBoat) -> None:
     assert boat.global_estimate.healthy
     boat.gps = False

@@ -322,6 +322,7 @@ def test_progress_is_told_when_it_is_made() -> None:
     assert only(messages, "MISSION_CURRENT").seq == 3
 
 
+@pytest.mark.slow
 def test_a_station_that_floods_is_not_heard_and_is_again_later() -> None:
     port, peer = made()
     frame = peer.pack(HEARTBEAT)

@@ -157,6 +157,7 @@ def test_the_map_origin_of_a_known_place() -> None:
 
 
 @given(st.lists(WIDE, min_size=8, max_size=8), st.floats(-1.0, 1.0), st.floats(0.0, 1e9))
+@pytest.mark.slow
 def test_no_value_that_a_message_may_have_breaks_a_frame(values: list[float], thrust: float, volts: float) -> None:
     x_m, y_m, yaw_rad, surge_mps, sway_mps, latitude_deg, longitude_deg, roll_rad = values
     pose = odometry(

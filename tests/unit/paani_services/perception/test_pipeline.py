@@ -86,6 +86,7 @@ def test_b5_evidence_of_a_picture() -> None:
         ("paper", [], 0.6, True),  # C6: what is above the threshold is there
     ],
 )
+@pytest.mark.slow
 def test_somebody_whom_the_mask_does_not_show_is_a_reflection(
     monkeypatch: pytest.MonkeyPatch, profile: str | None, sets: list[str], score: float, *, is_there: bool
 ) -> None:
@@ -98,6 +99,7 @@ def test_somebody_whom_the_mask_does_not_show_is_a_reflection(
 
 @pytest.mark.parametrize(("score", "is_sure"), [(0.9, True), (0.3, False)])
 @pytest.mark.parametrize(("polygon", "is_hidden"), [("[[0.3,1],[0.3,0.5],[0.7,0.5],[0.7,1]]", True), ("[]", False)])
+@pytest.mark.slow
 def test_who_is_seen_on_the_own_hull_is_neither_somebody_nor_may_be(
     monkeypatch: pytest.MonkeyPatch, polygon: str, score: float, *, is_hidden: bool, is_sure: bool
 ) -> None:
@@ -113,6 +115,7 @@ def test_who_is_seen_on_the_own_hull_is_neither_somebody_nor_may_be(
 
 
 @pytest.mark.parametrize("person_confidence", [0.15, 0.9])
+@pytest.mark.slow
 def test_a_person_who_would_count_alone_may_be_one_where_something_else_counts_more(
     monkeypatch: pytest.MonkeyPatch, person_confidence: float
 ) -> None:
@@ -126,6 +129,7 @@ def test_a_person_who_would_count_alone_may_be_one_where_something_else_counts_m
     assert m.CandidateKind.UNSURE_BOX in [each.kind for each in evidence.candidates]
 
 
+@pytest.mark.slow
 def test_c15_the_threshold_is_one_setting_and_travels() -> None:
     """C15."""
     config = load_config(sets=["perception.detections.confidence=0.25"]).perception
@@ -141,6 +145,7 @@ def test_concurrent_and_sequential_agree() -> None:
     assert (one.detections, one.left, one.center, one.right) == (two.detections, two.left, two.center, two.right)
 
 
+@pytest.mark.slow
 def test_b4_the_paper_runs_the_detector_and_then_the_segmenter(monkeypatch: pytest.MonkeyPatch) -> None:
     """B4: one run ends before the next begins, in one thread, on the same picture; one frame id names both."""
     eyes, runs = perceiver(load_config(profile="paper").perception), []
@@ -198,6 +203,7 @@ def test_the_clearly_slower_network_starts_beside_the_image_quality_check(
         (jpeg(river()[:60]), m.UnusableCause.WRONG_SIZE),
     ],
 )
+@pytest.mark.slow
 def test_a_bad_picture_is_a_value(data: bytes, cause: m.UnusableCause) -> None:
     """J19, W1: unusable with its cause; no detections, no lanes, no mask."""
     evidence, mask = perceiver().perceive(data, HEADER, 0.0)
@@ -225,6 +231,7 @@ def test_a_frozen_camera() -> None:
     assert eyes.perceive(jpeg(noisy(river(), 3.0)), HEADER, 0.0)[0].usable
 
 
+@pytest.mark.slow
 def test_f2_without_a_segmenter() -> None:
     """F1, F2: a mask to look at, declared not learned and not eligible."""
     evidence, mask = perceiver(PerceptionConfig(segmenter="none")).perceive(river(), HEADER, 0.0)
@@ -234,6 +241,7 @@ def test_f2_without_a_segmenter() -> None:
 
 
 @pytest.mark.parametrize("weights", ["open", "paper"])
+@pytest.mark.slow
 def test_another_set_sees_by_its_own_networks_and_a_file_of_ones_own_goes_before(weights: WeightSet) -> None:
     other = load_catalogue(OTHER_SETS[weights])
     names = [f"{role} {other[role].sha256[:12]}" for role in ("detector", "segmenter")]
@@ -268,6 +276,7 @@ def test_a_missing_or_corrupt_model_is_the_users_to_mend(tmp_path: Path) -> None
         OnnxEngine.load("detector", str(corrupt), 1)
 
 
+@pytest.mark.slow
 def test_b7_a_model_of_other_shapes_is_refused(tmp_path: Path) -> None:
     """B7, C1, C4, D5: the contract is compared at start."""
     file = tmp_path / "swapped.onnx"
@@ -277,6 +286,7 @@ def test_b7_a_model_of_other_shapes_is_refused(tmp_path: Path) -> None:
     assert OnnxEngine.load("segmenter", str(file), 1).info().startswith("segmenter ")
 
 
+@pytest.mark.slow
 def test_j19_the_paper_profile_accepts_black() -> None:
     """J19: the `paper` profile checks no picture, so black is evidence like any other."""
     paper = load_config(profile="paper").perception

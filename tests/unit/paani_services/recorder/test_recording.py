@@ -128,6 +128,7 @@ def test_a_clock_set_back_begins_a_part_that_is_flushed(tmp_path: Path) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_beyond_the_budget_the_oldest_recording_is_deleted_unless_kept(tmp_path: Path) -> None:
     """P3: rotation."""
     finished(tmp_path, name="20200101T000000Z-1.mcap")
@@ -145,6 +146,7 @@ def test_beyond_the_budget_the_oldest_recording_is_deleted_unless_kept(tmp_path:
     recording.close([], now_us(1))
 
 
+@pytest.mark.slow
 def test_no_recorder_deletes_what_another_is_writing(tmp_path: Path) -> None:
     """Two of them in one folder, with room for less than either has."""
     size = finished(tmp_path, name="20200101T000000Z-1.mcap").stat().st_size

@@ -123,6 +123,7 @@ def test_a_vessel_that_is_silent_is_forgotten() -> None:
     assert receiver.longitudes_deg() == {}
 
 
+@pytest.mark.slow
 def test_a_crowd_is_bounded_and_its_newest_are_told() -> None:
     receiver = Receiver()
     for number in range(MAX_VESSELS + 10):

@@ -62,6 +62,7 @@ def test_a_turn_is_counter_clockwise_from_the_bow_however_the_scanner_is_mounted
 @given(st.integers(1, 200), st.binary(max_size=40))
 @example(1000, HEADER + bytes(20))
 @settings(deadline=None, max_examples=30)
+@pytest.mark.slow
 def test_neither_pieces_nor_noise_before_it_change_a_turn(piece: int, noise: bytes) -> None:
     turn = lidar_turn(lambda deg: 2.0 + 0.01 * deg)
     assert turns_of(3 * (noise + turn), piece=piece) == turns_of(3 * turn)

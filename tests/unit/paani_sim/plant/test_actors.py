@@ -25,6 +25,7 @@ def straight(behaviour: Behaviour = Behaviour.GIVES_WAY, **changes: Any) -> Acto
 
 
 @pytest.mark.parametrize("name", ["lake", "river", "canal", "harbour"])
+@pytest.mark.slow
 def test_actor_path_equals_the_world_s_path(name: str) -> None:
     """The eye places actors with `actor_at`, the plant with its own measure of the path: one pose."""
     for actor in load_world(name).actors:

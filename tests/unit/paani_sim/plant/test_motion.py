@@ -58,6 +58,7 @@ def test_k6_heave_settles_at_0_177_with_a_damped_period_of_1_s(open_plant: OpenP
 @pytest.mark.parametrize(
     ("thrust_frac", "speed_mps"), [(0.01, 0.19), (0.02, 0.30), (0.04, 0.46), (0.08, 0.68), (1.0, 2.69)]
 )
+@pytest.mark.slow
 def test_k4_k5_thrust_gives_the_drag_limited_speed(open_plant: OpenPlant, thrust_frac: float, speed_mps: float) -> None:
     """75 N per unit and fan against 4 v + 20 v^2; 0.68 m/s at the paper's forward limit (1a)."""
     plant = open_plant()
@@ -77,6 +78,7 @@ def test_k4_two_fans_turn_the_boat_away_from_the_stronger(open_plant: OpenPlant)
     assert plant.velocity[2] == pytest.approx(0.200, abs=0.002)
 
 
+@pytest.mark.slow
 def test_k10_displacement_needs_thrust(open_plant: OpenPlant) -> None:
     """K10: 27 s of thrust displace the boat; 27 s without do not."""
     plant = open_plant()
@@ -86,6 +88,7 @@ def test_k10_displacement_needs_thrust(open_plant: OpenPlant) -> None:
     assert plant.distance_m == pytest.approx(27.0 * 0.30, rel=0.2)
 
 
+@pytest.mark.slow
 def test_running_into_the_bank_counts_once(open_plant: OpenPlant) -> None:
     """K3: banks are solid; staying in touch is one collision, coming back later another."""
     plant = open_plant()
@@ -99,6 +102,7 @@ def test_running_into_the_bank_counts_once(open_plant: OpenPlant) -> None:
     assert plant.collisions == 2
 
 
+@pytest.mark.slow
 def test_moving_actor_hits_a_drifting_boat(open_plant: OpenPlant) -> None:
     world = load_world("river")
     holding_on = dataclasses.replace(world.actors[0], behaviour=Behaviour.HOLDS_ON)

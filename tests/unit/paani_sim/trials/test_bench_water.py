@@ -32,6 +32,7 @@ def test_the_table_has_a_row_for_each_measurement() -> None:
     assert all(len(row) == len(part.columns) for row in part.rows)
 
 
+@pytest.mark.slow
 def test_a_drive_is_timed_after_its_warm_up() -> None:
     simulated_s, wall_s, cpu_s = time_drive(Policy.BLIND, 2, DEFAULT_CASE[1], 0.5, threads=False)
     assert simulated_s == pytest.approx(0.5)

@@ -101,6 +101,7 @@ def test_the_code_under_test_is_one_checkout() -> None:
     assert find_checkout() == ROOT
 
 
+@pytest.mark.slow
 def test_only_what_is_checked_out_is_measured(tmp_path: Path, git: Git) -> None:
     """HEAD, its digits, or an ancestor from which only the ledger differs."""
     root = tmp_path / "checkout"
@@ -170,6 +171,7 @@ def test_mistakes_with_parts_are_named_before_anything_is_written(
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_fresh_drives_are_entered_counted_and_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], git: Git
 ) -> None:

@@ -89,6 +89,7 @@ def test_a_free_course_is_held(planner: MotionPlanner) -> None:
 
 
 @pytest.mark.parametrize("planner", PLANNERS)
+@pytest.mark.slow
 def test_what_lies_ahead_is_passed(planner: MotionPlanner) -> None:
     x_m, y_m, widest_m, least_m = sail(planner, [(8.0, 0.1, 0.6)])
     assert x_m > 12.0
@@ -98,6 +99,7 @@ def test_what_lies_ahead_is_passed(planner: MotionPlanner) -> None:
 
 
 @pytest.mark.parametrize(("planner", "crosser"), CROSSINGS)
+@pytest.mark.slow
 def test_a_crossing_vessel_is_not_met(planner: MotionPlanner, crosser: Crosser) -> None:
     _, _, _, met_m = sail(lambda _: HeadingSpeed(0.0, SPEED_MPS), [], crosser)
     assert met_m < 0.0

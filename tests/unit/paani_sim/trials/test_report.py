@@ -43,6 +43,7 @@ def test_the_worst_moment() -> None:
 
 
 @pytest.mark.parametrize("world", ["lake", "canal"])
+@pytest.mark.slow
 def test_a_plan_is_well_formed_and_shows_the_track(world: str) -> None:
     scenario = build_scenario(TrialCase(world, 1, Policy.BLIND))
     start = scenario.world.start
@@ -69,6 +70,7 @@ def test_the_page_stands_alone() -> None:
     assert "NaN" not in text
 
 
+@pytest.mark.slow
 def test_the_page_has_a_sheet_of_the_imazu_cases() -> None:
     """Each driven case once, with its vessels, the boat's track and contacts; worlds are not on it."""
     track = tuple((2.0 * k, 1.2 * k, 0.0) for k in range(40))
@@ -86,6 +88,7 @@ def test_the_page_has_a_sheet_of_the_imazu_cases() -> None:
     assert "camera-fair, all seen" in page
 
 
+@pytest.mark.slow
 def test_a_recording_that_failed_is_not_there(tmp_path: Path) -> None:
     file = tmp_path / "drive.mcap"
     with pytest.raises(RuntimeError), DriveRecorder(file, load_case_config(CASES[0])):

@@ -48,6 +48,7 @@ def test_what_lies_beyond_one_side_does_not_stretch_the_bounds_along_another(mir
 
 @settings(max_examples=50, deadline=None)
 @given(range_m=st.floats(3.0, 10.0), bearing_deg=st.floats(-45.0, 45.0), aspect_deg=st.floats(-180.0, 180.0))
+@pytest.mark.slow
 def test_a_box_ends_where_the_part_of_the_vessel_in_the_picture_does(
     range_m: float, bearing_deg: float, aspect_deg: float
 ) -> None:

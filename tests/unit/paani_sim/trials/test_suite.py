@@ -76,6 +76,7 @@ def test_a_malformed_case_is_refused(text: str, says: str) -> None:
         parse_case(text)
 
 
+@pytest.mark.slow
 def test_a_fault_begins_while_the_boat_drives() -> None:
     scenario = build_scenario(TrialCase("lake", 4, Policy.PAANI, "camera_frozen"))
     [fault] = scenario.faults
@@ -90,6 +91,7 @@ def write(folder: Path, case: TrialCase, fingerprint: Fingerprint) -> None:
     path.write_bytes(encode_stored_result(StoredResult(fingerprint=fingerprint, result=RESULT)))
 
 
+@pytest.mark.slow
 def test_an_interrupted_suite_goes_on(tmp_path: Path, reader: FingerprintReader) -> None:
     """Results made alike are kept; one of other code is named and driven again, and so is half a file."""
     write(tmp_path, CASES[0], reader.fingerprint(CASES[0]))
@@ -103,6 +105,7 @@ def test_an_interrupted_suite_goes_on(tmp_path: Path, reader: FingerprintReader)
     assert find_stored_results(tmp_path, CASES, reader).missing == tuple(CASES)
 
 
+@pytest.mark.slow
 def test_settings_and_scenario_files_are_part_of_what_made_a_result(tmp_path: Path, reader: FingerprintReader) -> None:
     case = CASES[0]
     other = FingerprintReader(("navigator.cruise_mps=0.5",)).fingerprint(case)
@@ -209,6 +212,7 @@ def test_figures_of_people_and_of_several_parts_say_so() -> None:
         (["--one", "lake:1:paani", "--record", "/nowhere/a.mcap"], "no such folder"),
     ],
 )
+@pytest.mark.slow
 def test_mistakes_are_named(words: list[str], says: str, tmp_path: Path) -> None:
     with pytest.raises(UserError, match=says):
         command.main([*words, "--out", str(tmp_path / "run")])
@@ -222,6 +226,7 @@ def test_malformed_options_are_refused(words: list[str]) -> None:
     assert stop.value.code == 2
 
 
+@pytest.mark.slow
 def test_a_finished_suite_is_only_read(
     tmp_path: Path, reader: FingerprintReader, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -119,6 +119,7 @@ def test_the_figures_of_a_sweep_are_by_policy_and_value() -> None:
         (("--scenario", "imazu-01", "--sweep", "people_factor=1"), "imazu-01 says itself what is met"),
     ],
 )
+@pytest.mark.slow
 def test_a_sweep_that_is_none_is_refused(
     words: tuple[str, ...], says: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -128,6 +129,7 @@ def test_a_sweep_that_is_none_is_refused(
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_a_wind_is_swept_for_a_hull_that_it_moves_and_everything_else_for_any() -> None:
     require_swept_effect(TrialCase("lake", 1, Policy.ORACLE, swept="wind_mps=3"), ("plant.vessel=otter",))
     for name in SWEPT_CONDITIONS.keys() - {"wind_mps"}:

@@ -29,6 +29,7 @@ def gusts(count: int, wind: Wind, seed: int = 1) -> list[float]:
     return found
 
 
+@pytest.mark.slow
 def test_gusts_have_their_spread_and_time_constant() -> None:
     speeds = gusts(60_000, Wind(6.0, 0.6, gust_frac=0.2, gust_s=5.0))
     assert statistics.fmean(speeds) == pytest.approx(6.0, abs=0.25)
@@ -88,6 +89,7 @@ def test_still_water() -> None:
     assert CurrentField(load_world("lake")).at(0.0, 0.0) == (0.0, 0.0)
 
 
+@pytest.mark.slow
 def test_current_is_the_same_on_any_number_of_threads() -> None:
     """Drives are the same to the byte on every machine, and in a worker of its own."""
     world = dataclasses.replace(load_world("river"), current=Current(speed_mps=0.3))

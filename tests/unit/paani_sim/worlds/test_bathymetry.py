@@ -32,6 +32,7 @@ def model_of_shoals() -> tuple[mujoco.MjModel, mujoco.MjData]:
 
 
 @given(st.floats(-8.0, 40.0), st.floats(-14.0, 8.0))
+@pytest.mark.slow
 def test_a_ray_straight_down_meets_the_shoal_at_the_depth_there(x_m: float, y_m: float) -> None:
     model, data = model_of_shoals()
     geom = np.zeros(1, np.int32)
@@ -46,6 +47,7 @@ def test_a_ray_straight_down_meets_the_shoal_at_the_depth_there(x_m: float, y_m:
 
 
 @given(st.floats(0.5, 9.0), st.floats(0.0, 1.0), st.floats(1.2, 6.0), st.floats(0.0, 1.0))
+@pytest.mark.slow
 def test_the_radius_of_a_depth_is_where_the_water_is_so_deep(
     radius_m: float, top_m: float, bottom_m: float, part: float
 ) -> None:
@@ -57,6 +59,7 @@ def test_the_radius_of_a_depth_is_where_the_water_is_so_deep(
     assert radius_at_depth_m(shoal, bottom_m, 0.5 * top_m - 0.1) == 0.0
 
 
+@pytest.mark.slow
 def test_a_world_without_shoals_has_the_model_that_it_had() -> None:
     names = {each.name for each in build_spec(load_world("river")).geoms}
     assert not any(name.startswith(("shoal", "keel")) for name in names)

@@ -35,6 +35,7 @@ def test_check_says_which_files_are_sound(tmp_path: Path, capsys: pytest.Capture
     assert "`water`" in captured.err
 
 
+@pytest.mark.slow
 def test_mjcf_is_a_model_of_the_scenario(tmp_path: Path) -> None:
     out = tmp_path / "model.xml"
     assert main(["mjcf", "canal_head_on", "--out", str(out)]) == 0

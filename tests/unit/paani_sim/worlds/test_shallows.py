@@ -85,6 +85,7 @@ def test_water_without_room_for_a_deep_way_past_gets_no_shoal() -> None:
     assert [add_shoals(section, route, 45.0, grid, np.random.default_rng(seed)) for seed in range(4)] == [None] * 4
 
 
+@pytest.mark.slow
 def test_the_plan_shows_shoals_and_what_their_colour_means() -> None:
     plan = draw_plan_view(load_scenario("random:shallows:1"), 600, 400)
     is_shoal = (plan == np.array(SHOAL, np.uint8)).all(axis=2)

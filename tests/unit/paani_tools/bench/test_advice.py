@@ -146,6 +146,7 @@ def test_a_data_folder_becomes_a_table_and_one_line_per_picture(
     assert "advice on 1 annotated pictures, held-out sequences" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_centre_that_is_occupied_by_eye_is_no_open_water(
     data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -175,6 +176,7 @@ def test_a_mask_that_is_mistaken_by_eye_says_nothing(
         (["DATA", "--most", "0"], "0 is not at least 1"),
     ],
 )
+@pytest.mark.slow
 def test_a_mistake_is_one_line(
     words: list[str], complaint: str, data: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -191,6 +191,7 @@ class RefusingLoop(SlowLoop):
             self.watch.reports.append(Report(now_us, True, m.ZeroCause.NONE, now_us, now_us))
 
 
+@pytest.mark.slow
 async def test_a_hand_that_is_refused_holds_again_and_the_time_counts_from_its_first_hold(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

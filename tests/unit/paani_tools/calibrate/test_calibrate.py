@@ -81,6 +81,7 @@ def test_what_stands_before_the_shore_is_left_out() -> None:
     assert fit_waterline(evidence(1, tuple(np.linspace(0.2, 0.9, 80) ** 3)), rng) is None
 
 
+@pytest.mark.slow
 def test_a_recording_becomes_settings_that_can_be_used(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file, out = recording(tmp_path, drawn(40, 0.05, 0.0)), tmp_path / "calibration.toml"
     assert paani(["calibrate", str(file), "--shore-m", "150", "--out", str(out), *KNOWN]) == 0
@@ -123,6 +124,7 @@ def still(count: int) -> Iterator[Pair]:
         (still(30), "too still"),
     ],
 )
+@pytest.mark.slow
 def test_bad_input_is_one_line_and_writes_nothing(
     pairs: Iterator[Pair], expected: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -151,6 +153,7 @@ def test_bad_words_are_one_line(words: list[str], expected: str, capsys: pytest.
     assert error.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_a_near_shore_and_a_recording_without_evidence_are_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -147,6 +147,7 @@ def test_a_drive_by_radio_is_refused_because_its_thrust_is_unknown(rich: Message
         drive_of([*rich.applied[:600], taken, *rich.applied[601:]], rich.odometry, rich.fixes, rich.samples)
 
 
+@pytest.mark.slow
 def test_a_drive_with_holes_or_without_heading_is_refused(rich: Messages) -> None:
     hole = [*rich.applied[:400], *rich.applied[460:]]
     with pytest.raises(UserError, match=r"no plant/thrust_applied for 3\.\d s, 20 s into the drive"):
@@ -184,6 +185,7 @@ def test_a_fix_far_off_is_left_out(rich: Messages) -> None:
         (("{log}", "--vessel", "paper"), "no plant/thrust_applied in it"),
     ],
 )
+@pytest.mark.slow
 def test_a_mistake_is_told_in_one_line(
     words: tuple[str, ...], expected: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -205,6 +207,7 @@ def test_twenty_seconds_are_too_few(tmp_path: Path, capsys: pytest.CaptureFixtur
 
 
 @pytest.mark.parametrize("vessel", ["paper", "otter"])
+@pytest.mark.slow
 def test_the_model_follows_the_published_one(vessel: str) -> None:
     """A turning circle of a minute in still water: at the same times as Fossen's equations solved by SciPy."""
     turn = Manoeuvre("turning circle", 60.0, 3.0, 9.0)

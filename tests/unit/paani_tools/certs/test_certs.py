@@ -62,6 +62,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.parametrize("graph", Graph)
+@pytest.mark.slow
 def test_every_identity_has_a_private_key_and_nobody_else_may_read_it(tmp_path: Path, graph: Graph) -> None:
     folder = made(tmp_path, graph)
     names = (AUTHORITY, *authority.users_in(graph), *LISTENERS)
@@ -88,6 +89,7 @@ def test_an_independent_program_verifies_what_was_signed(folder: Path) -> None:
     assert verify("controller", "-purpose", "sslserver") != 0
 
 
+@pytest.mark.slow
 def test_rotating_one_leaves_the_others(folder: Path) -> None:
     before = contents(folder)
     certificates.rotate(folder, "advisor", NOW_US, 30)
@@ -107,6 +109,7 @@ def forget(folder: Path, *names: str) -> None:
 
 
 @HULL
+@pytest.mark.slow
 def test_what_an_older_folder_lacks_is_told_and_made_without_changing_the_others(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -141,6 +144,7 @@ def test_nothing_is_made_where_the_authority_has_no_key(folder: Path) -> None:
     assert contents(folder) == before
 
 
+@pytest.mark.slow
 def test_a_revoked_identity_has_no_rights_until_it_gets_new_ones(folder: Path) -> None:
     bus = BusConfig(certificates=str(folder))
 
@@ -160,6 +164,7 @@ def test_a_revoked_identity_has_no_rights_until_it_gets_new_ones(folder: Path) -
     assert "'controller.2'" in subjects()
 
 
+@pytest.mark.slow
 def test_what_cannot_be_written_changes_nothing(folder: Path) -> None:
     (folder / f".{INDEX_FILE}.{os.getpid()}").mkdir()
     before = {path.name for path in folder.iterdir()}
@@ -170,6 +175,7 @@ def test_what_cannot_be_written_changes_nothing(folder: Path) -> None:
     require_certificates(BusConfig(certificates=str(folder)), authority.users_in(Graph.SIMULATION))
 
 
+@pytest.mark.slow
 def test_a_folder_is_made_whole_or_not_at_all(tmp_path: Path) -> None:
     with pytest.raises(UserError, match=r"--address '-no way-'"):
         certificates.make(tmp_path / "certs", Graph.HULL, ("-no way-",), NOW_US, 30)

@@ -13,6 +13,7 @@ from tests.places import ROOT
 ROWS = tomllib.loads((ROOT / "tests" / "claims.toml").read_text(encoding="utf-8"))
 
 
+@pytest.mark.slow
 def test_every_statement_is_listed_with_its_proof(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["claims", "--json"]) == 0
     listed = msgspec.json.decode(capsys.readouterr().out)
@@ -34,6 +35,7 @@ def test_every_statement_is_listed_with_its_proof(capsys: pytest.CaptureFixture[
         (["O", "--find", "1,000 ms", "--state", "exempt", "proved"], ["O4"]),
     ],
 )
+@pytest.mark.slow
 def test_statements_are_chosen_by_id_words_and_state(
     words: list[str], ids: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -44,6 +46,7 @@ def test_statements_are_chosen_by_id_words_and_state(
 
 
 @pytest.mark.parametrize("name", ["X9", "J99", "J7-K2", "7"])
+@pytest.mark.slow
 def test_an_unknown_id_is_refused(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["claims", name]) == 2
     assert capsys.readouterr().err.startswith(f"paani: {name}: no such statement")

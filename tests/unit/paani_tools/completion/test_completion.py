@@ -28,6 +28,7 @@ def complete(*words: str) -> set[str]:
     return {line.strip() for line in done.stdout.splitlines()}
 
 
+@pytest.mark.slow
 def test_bash_completes_commands_options_and_choices() -> None:
     assert {point.name for point in entry_points(group="paani.commands")} < complete("")
     assert complete("up", "--he") == {"--help", "--headless"}
@@ -46,6 +47,7 @@ def test_bash_completes_files_where_an_option_takes_one() -> None:
 
 
 @pytest.mark.parametrize("shell", SHELLS)
+@pytest.mark.slow
 def test_a_script_is_one_for_its_shell(shell: str) -> None:
     if shutil.which(shell) is None:
         assert "headless" in script(shell)

@@ -95,6 +95,7 @@ def test_too_little_space_for_the_recorder_is_told(tmp_path: Path) -> None:
     assert "1,000,000,000 needed" in recorder.text
 
 
+@pytest.mark.slow
 def test_a_damaged_model_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     weights = tmp_path / "weights"
     shutil.copytree(catalogue.WEIGHTS, weights)
@@ -109,6 +110,7 @@ def test_a_damaged_model_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert (segmenter.state, gate.state) == (State.OK, State.OK)
 
 
+@pytest.mark.slow
 def test_a_model_of_ones_own_that_is_none_is_named(tmp_path: Path) -> None:
     mine = tmp_path / "mine.onnx"
     mine.write_bytes(b"no model")
@@ -205,6 +207,7 @@ def test_the_exit_code_says_whether_something_fails(
     assert (camera["check"], camera["state"], page["state"]) == ("camera", "fail", "ok")
 
 
+@pytest.mark.slow
 def test_every_line_is_one_line_and_says_what_to_do(capsys: pytest.CaptureFixture[str]) -> None:
     main(["camera", "disk", "versions", "--set", "camera.source=webcam:97", "--set", "bus.runtime_dir=/proc/paani"])
     lines = capsys.readouterr().out.splitlines()
@@ -215,6 +218,7 @@ def test_every_line_is_one_line_and_says_what_to_do(capsys: pytest.CaptureFixtur
 @pytest.mark.parametrize(
     ("name", "state"), [("controller", State.FAIL), ("host_router", State.FAIL), ("nmea", State.WARN)]
 )
+@pytest.mark.slow
 def test_an_identity_without_certificate_is_told_with_what_makes_one(tmp_path: Path, name: str, state: State) -> None:
     folder = tmp_path / "certs"
     certificates.make(folder, Graph.SIMULATION, (), WallClock().now_us(), 30)
@@ -227,6 +231,7 @@ def test_an_identity_without_certificate_is_told_with_what_makes_one(tmp_path: P
 
 
 @pytest.mark.parametrize(("days", "state"), [(30, State.OK), (7, State.WARN)])
+@pytest.mark.slow
 def test_certificates_that_expire_soon_are_told(tmp_path: Path, days: int, state: State) -> None:
     folder = tmp_path / "certs"
     certificates.make(folder, Graph.SIMULATION, (), WallClock().now_us(), days)

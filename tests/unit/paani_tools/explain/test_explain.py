@@ -66,6 +66,7 @@ def last_change() -> tuple[int, m.Advisory]:
     return changes[-1]
 
 
+@pytest.mark.slow
 def test_by_default_the_last_change_of_direction_is_told(capsys: pytest.CaptureFixture[str], log: Path) -> None:
     at_us, advisory = last_change()
     assert last_change_us(open_log(log)) == at_us
@@ -223,6 +224,7 @@ def test_thrust_that_another_order_gave_is_not_that_of_this_one(tmp_path: Path) 
     assert moment_at(open_log(write_log(tmp_path / "a.mcap", [*DRIVE, other])), T0_US + 8_000_000).applied is None
 
 
+@pytest.mark.slow
 def test_the_picture_is_drawn(capsys: pytest.CaptureFixture[str], log: Path, tmp_path: Path) -> None:
     out = tmp_path / "p.png"
     code, _, _ = paani(capsys, "explain", log, "--at", "8", "--picture", out)

@@ -70,6 +70,7 @@ def record(folder: Path, config: Config | None = None) -> Path:
     return log.path
 
 
+@pytest.mark.slow
 def test_values_are_those_of_the_recording(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, out = record(tmp_path), tmp_path / "out.mcap"
     assert main(["logs", "export", str(path), "--ros2", str(out)]) == 0
@@ -113,6 +114,7 @@ def test_frames_and_names_are_those_of_the_recorded_boat(tmp_path: Path) -> None
     assert children == {"beaver/odom", "beaver/base_link", "beaver/camera_optical"}
 
 
+@pytest.mark.slow
 def test_what_cannot_be_exported_is_told_in_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

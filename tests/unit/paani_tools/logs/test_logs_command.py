@@ -56,6 +56,7 @@ def test_changes_of_direction_are_counted() -> None:
     assert (directions.advisories, directions.changes) == (5, 3)
 
 
+@pytest.mark.slow
 def test_an_unfinished_file_is_told_and_mended(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = unfinished(tmp_path, 60)
     assert main(["logs", "info", str(path)]) == 1
@@ -155,6 +156,7 @@ def test_a_later_format_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert refused(capsys, "info", path) == f"paani: {path}: recorded in format 2; this program reads up to 1"
 
 
+@pytest.mark.slow
 def test_mistakes_are_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = finished(tmp_path)
     empty = tmp_path / "empty"
@@ -185,6 +187,7 @@ def advised(folder: Path, name: str, from_us: int) -> None:
     log.finish({})
 
 
+@pytest.mark.slow
 def test_two_drives_in_one_folder_last_as_long_as_both(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The day between them is no part of either."""
     advised(tmp_path, ONE, START_US)

@@ -119,6 +119,7 @@ def rrd(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Entity]:
     return read(out)
 
 
+@pytest.mark.slow
 def test_every_pose_is_there(rrd: dict[str, Entity]) -> None:
     boat = rrd["/map/boat"]
     places = boat.column("Transform3D:translation")
@@ -132,6 +133,7 @@ def test_every_pose_is_there(rrd: dict[str, Entity]) -> None:
     assert earth[0] == pytest.approx([52.0 + 1e-5, 4.0])
 
 
+@pytest.mark.slow
 def test_pictures_are_the_recorded_bytes_at_their_own_time(rrd: dict[str, Entity]) -> None:
     picture = rrd["/map/boat/camera/picture"]
     assert [bytes(row[0]) for row in picture.column("EncodedImage:blob")] == [JPEG] * len(PICTURES)

@@ -88,6 +88,7 @@ def test_readable_lines_and_annotated_pictures(
     assert drawn.shape == (742, 800, 3)
 
 
+@pytest.mark.slow
 def test_the_paper_goes_on_in_the_dark(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """J19: the `paper` profile has no image-quality check, so black is judged by the nets."""
     assert main([str(folder / "black.png"), "--json", "--profile", "paper"]) == 0
@@ -126,6 +127,7 @@ def test_a_video_is_one_sequence(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert causes == ["none"] * 2 + ["frozen"] * 6
 
 
+@pytest.mark.slow
 def test_a_mistake_is_one_line_and_exit_2(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     spoilt = tmp_path / "spoilt.jpg"
     spoilt.write_bytes(b"spoilt")
@@ -158,6 +160,7 @@ def test_an_impossible_output_is_refused_before_the_first_picture(
     assert sorted(path.name for path in Path().iterdir()) == ["river.png", "spoilt.jpg"]
 
 
+@pytest.mark.slow
 def test_annotated_pictures_go_below_runs_by_default(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     cv2.imwrite("river.png", river())
@@ -195,6 +198,7 @@ def test_a_sheet_shows_the_folder_in_one_picture(folder: Path, tmp_path: Path, m
     assert sorted(path.name for path in tmp_path.iterdir()) == ["pictures", "sheet.png"]
 
 
+@pytest.mark.slow
 def test_a_sheet_of_many_is_spread_over_all_of_them() -> None:
     sheet = ContactSheet()
     assert sheet.compose() is None

@@ -71,6 +71,7 @@ def test_the_papers_figures_are_those_of_its_statements() -> None:
         assert all(number.rstrip("0").rstrip(".") in SAYS[statement] for number in numbers), statement
 
 
+@pytest.mark.slow
 def test_pictures_are_decided_anew_and_the_papers_advice_comes_out() -> None:
     table = stills_table(PAPER, OURS)
     assert column(table, "here") == column(table, "paper")
@@ -181,6 +182,7 @@ def test_without_pytorch_the_papers_recipe_stands_alone(monkeypatch: pytest.Monk
     assert all("extra `train`" in why for why in column(table, "what differs")[:-1])
 
 
+@pytest.mark.slow
 def test_the_report_is_one_page_of_tables(tmp_path: Path) -> None:
     file = tmp_path / "report.md"
     assert paani(["paper-report", "--out", str(file)]) == 0
@@ -206,6 +208,7 @@ def test_a_folder_without_a_run_is_named(
     assert str(tmp_path / "board.json") in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_run_of_the_board_protocol_takes_its_place(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run = run_of(polls(12, 2.0), 12, {})
     (tmp_path / "board.json").write_bytes(msgspec.json.encode({"run": run, "polls": []}))

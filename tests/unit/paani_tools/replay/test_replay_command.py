@@ -28,6 +28,7 @@ def log(tmp_path: Path) -> Path:
     return write_log(tmp_path / "drive.mcap", DRIVE)
 
 
+@pytest.mark.slow
 def test_an_exact_log(capsys: pytest.CaptureFixture[str], log: Path, tmp_path: Path) -> None:
     code, out, errors = paani(capsys, "replay", log, "--check", "--json", tmp_path / "r.json")
     assert (code, errors) == (0, "")
@@ -41,6 +42,7 @@ def test_an_exact_log(capsys: pytest.CaptureFixture[str], log: Path, tmp_path: P
     assert list(tmp_path.glob(".*beside")) == []
 
 
+@pytest.mark.slow
 def test_a_log_that_differs(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     thrust = next(r for r in DRIVE if r.topic == "controller/thrust" and b'"enabled":true' in r.data)
     other = thrust._replace(data=thrust.data.replace(b'"enabled":true', b'"enabled":false'))
@@ -51,6 +53,7 @@ def test_a_log_that_differs(capsys: pytest.CaptureFixture[str], tmp_path: Path) 
     assert "enabled was false, is true" in out
 
 
+@pytest.mark.slow
 def test_other_settings_print_what_changes(capsys: pytest.CaptureFixture[str], log: Path, tmp_path: Path) -> None:
     setting = "advisor.policy.center_block_risk=0.35"
     code, out, _ = paani(capsys, "replay", log, "--check", "--set", setting, "--json", tmp_path / "r.json")
@@ -65,6 +68,7 @@ def test_other_settings_print_what_changes(capsys: pytest.CaptureFixture[str], l
     assert "navigator/command  go STRAIGHT -> " in out
 
 
+@pytest.mark.slow
 def test_services_that_are_not_installed_are_named(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     step = next(r for r in DRIVE if r.topic == "controller/step")
     file = write_log(tmp_path / "drive.mcap", [*DRIVE, step._replace(topic="helmsman/step")])
@@ -81,6 +85,7 @@ def test_a_log_without_decisions_is_not_exact(capsys: pytest.CaptureFixture[str]
     assert out.splitlines()[-1] == "0 decisions, 0 differ"
 
 
+@pytest.mark.slow
 def test_settings_of_a_newer_version_need_force(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     tree = json.loads(encode_config(CONFIG))
     tree["advisor"]["policy"]["clairvoyance"] = 0.5
@@ -106,6 +111,7 @@ def test_settings_of_a_newer_version_need_force(capsys: pytest.CaptureFixture[st
     assert (code, len(errors.splitlines())) == (2, 1)
 
 
+@pytest.mark.slow
 def test_other_weights_need_force_and_say_what_it_means(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     installed = _installed_manifest()
     assert installed is not None
@@ -138,6 +144,7 @@ def test_other_weights_need_force_and_say_what_it_means(capsys: pytest.CaptureFi
     ],
     ids=["unknown setting", "bad value", "folder", "no use", "topic", "command", "address", "foreign address"],
 )
+@pytest.mark.slow
 def test_a_mistake_is_one_line(
     capsys: pytest.CaptureFixture[str], log: Path, words: tuple[str, ...], named: str
 ) -> None:
@@ -148,6 +155,7 @@ def test_a_mistake_is_one_line(
 
 
 @pytest.mark.parametrize("what", ["missing", "empty", "foreign", "no config"])
+@pytest.mark.slow
 def test_what_is_no_log_is_one_line(capsys: pytest.CaptureFixture[str], tmp_path: Path, what: str) -> None:
     file = tmp_path / "a.mcap"
     if what == "no config":
@@ -160,6 +168,7 @@ def test_what_is_no_log_is_one_line(capsys: pytest.CaptureFixture[str], tmp_path
         assert str(file) in errors
 
 
+@pytest.mark.slow
 def test_settings_can_be_those_of_the_paper(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     config = with_settings(CONFIG, ("advisor.tracker.held_decay_s=1e9", "navigator.latch_turns=false"))
     file = write_log(tmp_path / "drive.mcap", drive(6.0, config), config)
@@ -168,6 +177,7 @@ def test_settings_can_be_those_of_the_paper(capsys: pytest.CaptureFixture[str], 
     assert msgspec.json.decode(encode_config(config)) != msgspec.json.decode(encode_config(CONFIG))
 
 
+@pytest.mark.slow
 def test_the_bench_gives_the_speed_of_a_check(capsys: pytest.CaptureFixture[str], log: Path, tmp_path: Path) -> None:
     file = tmp_path / "b.json"
     code, out, _ = paani(capsys, "bench", "judgement", "--only", "replay", "--drive", log, "--json", file)

@@ -58,6 +58,7 @@ def test_only_the_wanted_topics_and_times(tmp_path: Path) -> None:
     assert len(wanted) > 10
 
 
+@pytest.mark.slow
 def test_a_folder_of_parts_is_one_log(tmp_path: Path) -> None:
     thirds = [RECORDS[i : i + len(RECORDS) // 3 + 1] for i in range(0, len(RECORDS), len(RECORDS) // 3 + 1)]
     for number, part in enumerate(thirds):

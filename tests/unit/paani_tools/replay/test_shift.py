@@ -52,6 +52,7 @@ def test_the_order_of_times_and_equal_stamps_stay(offsets_us: list[int], speed: 
 
 
 @pytest.mark.parametrize("service", keys.DECIDING_SERVICES)
+@pytest.mark.slow
 def test_a_moved_drive_is_still_exact(service: str) -> None:
     """Ledger, states and messages move together: what was recorded from a replay can be checked as well."""
     moved = [record._replace(data=LATER.shift_message(record.data)) for record in drive(14.0)]

@@ -35,6 +35,7 @@ from tests.synthetic_water import PLANNER
     age_s=st.floats(0.0, 20.0),
     boat=st.tuples(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0), st.floats(-3.1, 3.1), st.floats(0.0, 0.6)),
 )
+@pytest.mark.slow
 def test_one_prediction_holds_for_candidates_and_for_a_boat_that_coasts_or_rests(
     place: tuple[float, float],
     velocity: tuple[float, float, float],

@@ -79,6 +79,7 @@ def test_areas_that_keep_in_join() -> None:
 )
 @example([(3.0, 0.2), (2.0, 0.5), (2.0, 0.5), (2.0, 0.5)], (2.0, 0.0), (0.0, 0.0), Keep.OUT)  # from a corner inwards
 @settings(max_examples=60, deadline=None)
+@pytest.mark.slow
 def test_allowed_distance_agrees_with_probing_along_the_line(
     spokes: list[tuple[float, float]], start: tuple[float, float], end: tuple[float, float], keep: Keep
 ) -> None:
@@ -124,6 +125,7 @@ def test_an_edge_astern_is_kept_off_as_one_ahead(x_m: float, way_mps: float, spe
 
 @pytest.mark.parametrize("is_astern", [False, True])
 @pytest.mark.parametrize("noise_mps", [0.04, 0.099])
+@pytest.mark.slow
 def test_noise_away_from_the_edge_is_no_way_off_it(noise_mps: float, *, is_astern: bool) -> None:
     """Too slow for a course: nearer the edge it counts, farther from it does not."""
     sense = -1.0 if is_astern else 1.0
@@ -185,6 +187,7 @@ def test_the_boat_stops_before_the_edge_and_says_why() -> None:
     assert boat.speed_mps < 0.01
 
 
+@pytest.mark.slow
 def test_the_boat_stops_before_land_as_before_a_fence() -> None:
     shore = box(Keep.OUT, 40, -30, 50, 30)
     mission = msgspec.structs.replace(mission_of_route(straight_to((5, 4), (80, 4))), land=(shore,))
@@ -195,6 +198,7 @@ def test_the_boat_stops_before_land_as_before_a_fence() -> None:
     assert aground.settle(5.0).inhibits == (Inhibit.OUTSIDE_FENCE,)
 
 
+@pytest.mark.slow
 def test_a_boat_pushed_out_stays_still_or_comes_back() -> None:
     mission = msgspec.structs.replace(mission_of_route(straight_to((5, 4), (30, 4))), fence=FENCE)
     still = DriftingBoat(mission, PAANI, (44.0, 4.0))

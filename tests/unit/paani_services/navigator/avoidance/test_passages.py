@@ -68,6 +68,7 @@ ONCOMING = vessel(12.0, 0.0, -0.6, 0.0)
 
 @settings(max_examples=25, deadline=None)
 @given(range_m=st.floats(10.0, 14.0), off_m=st.floats(-0.3, 0.3), course_deg=st.floats(-5.0, 5.0))
+@pytest.mark.slow
 def test_head_on_the_boat_turns_to_starboard(range_m: float, off_m: float, course_deg: float) -> None:
     """So that both pass port to port: early, by a turn that is seen, and without slowing down."""
     course_rad = math.radians(180.0 + course_deg)
@@ -79,6 +80,7 @@ def test_head_on_the_boat_turns_to_starboard(range_m: float, off_m: float, cours
 
 @settings(max_examples=25, deadline=None)
 @given(time_s=st.floats(9.0, 14.0), speed_mps=st.floats(0.4, 0.9), side=st.sampled_from([-1.0, 1.0]))
+@pytest.mark.slow
 def test_a_crossing_vessel_is_passed_astern(time_s: float, speed_mps: float, side: float) -> None:
     """It would be met in so many seconds; the boat turns to the side that it comes from, or slows down."""
     met = vessel(0.6 * time_s, side * speed_mps * time_s, 0.0, -side * speed_mps)
@@ -150,6 +152,7 @@ def test_there_is_no_courtesy_towards(other: DynamicObstacle) -> None:
 
 @settings(max_examples=25, deadline=None)
 @given(std_mps=st.tuples(st.floats(0.0, 0.3), st.floats(0.0, 0.3)), age_s=st.floats(0.0, 10.0))
+@pytest.mark.slow
 def test_the_surer_the_velocity_the_more_it_counts(std_mps: tuple[float, float], age_s: float) -> None:
     low, high = sorted(std_mps)
     sure, unsure = (find_passages(evaluate(vessel(12.0, 0.0, -0.6, 0.0, std, age_s))).weight for std in (low, high))
@@ -161,6 +164,7 @@ def test_the_surer_the_velocity_the_more_it_counts(std_mps: tuple[float, float],
 @settings(max_examples=25, deadline=None)
 @given(range_m=st.floats(4.0, 12.0), north_m=st.floats(-1.0, 1.0), speed_mps=st.floats(0.25, 0.4))
 @example(range_m=4.0, north_m=0.0, speed_mps=0.3)  # as fast as a candidate, so that the two stand still to each other
+@pytest.mark.slow
 def test_slowing_down_behind_a_vessel_does_not_end_the_encounter(
     range_m: float, north_m: float, speed_mps: float
 ) -> None:
@@ -220,6 +224,7 @@ def test_courtesy_never_leads_further_into_the_margin(
     place=st.tuples(st.floats(3.0, 13.0), st.floats(-8.0, 8.0)),
     velocity=st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0)),
 )
+@pytest.mark.slow
 def test_giving_way_is_the_same_mirrored(place: tuple[float, float], velocity: tuple[float, float]) -> None:
     (x_m, y_m), (east_mps, north_mps) = place, velocity
     here, mirrored = (

@@ -97,6 +97,7 @@ def test_q4_three_seconds_in_steps_of_0_2() -> None:
     offset=st.floats(-3.0, 3.0),
     speed=st.floats(0.0, 0.4),
 )
+@pytest.mark.slow
 def test_q5_speed_yaw_rate_and_acceleration(surge: float, rate: float, offset: float, speed: float) -> None:
     """Q5: no trajectory is faster than 0.4 m/s, turns faster than 0.35 rad/s or accelerates by more than 0.2 m/s2."""
     assert (PAPER.speed_mps, PAPER.yaw_rate_radps, PAPER.accel_mps2) == (0.4, 0.35, 0.2)
@@ -132,6 +133,7 @@ def test_q6_hull_margin_and_drift() -> None:
     surge=st.floats(0.0, 0.6),
     side=st.sampled_from([-1.0, 0.0, 1.0]),
 )
+@pytest.mark.slow
 def test_no_plan_enters_an_occupied_cell(
     bars: list[tuple[float, float, float, float]], bank_m: float, course: float, surge: float, side: float
 ) -> None:
@@ -249,6 +251,7 @@ def test_a_boat_before_a_wall_pivots() -> None:
         assert plan_on(pool(bank_m=1.6), start, AHEAD, None, fans).speed_mps == 0.0
 
 
+@pytest.mark.slow
 def test_a_pivot_is_no_smaller_than_the_smallest_one_allowed() -> None:
     """A boat that may wait does not creep along in small pivots."""
     for bank_m in np.arange(1.0, 4.0, 0.1).tolist():

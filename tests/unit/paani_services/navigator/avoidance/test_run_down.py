@@ -232,6 +232,7 @@ def test_a_plan_in_force_is_as_fast_as_is_allowed_now(
     aside_m=st.floats(-1.2, 1.2),
     surge_mps=st.floats(0.0, 0.6),
 )
+@pytest.mark.slow
 def test_a_boat_is_never_left_at_rest_before_what_runs_it_down(
     bearing_rad: float, speed_mps: float, in_s: float, aside_m: float, surge_mps: float
 ) -> None:
@@ -286,6 +287,7 @@ def test_it_is_left_to_any_side_and_right_round() -> None:
 
 @settings(max_examples=25, deadline=None)
 @given(bearing_rad=st.floats(-1.5, 1.5), side_m=st.floats(0.75, 1.9), in_s=st.floats(2.0, 8.0))
+@pytest.mark.slow
 def test_nobody_is_fled_from_into_what_stands_beside_the_boat(bearing_rad: float, side_m: float, in_s: float) -> None:
     """A plan before a vessel that runs the boat down keeps off a wall beside it as a plan without the vessel may."""
     edge = water_edge_of(BoatPose(0.0, 0.0, 0.0), ((0.8, side_m, 6.0, side_m + 0.6),))
@@ -325,6 +327,7 @@ def test_a_blow_is_weighed_of_what_cannot_be_outrun(speed_mps: float, aside_m: f
 
 
 @pytest.mark.parametrize("label", [Label.VESSEL, Label.BUOY, Label.PERSON])
+@pytest.mark.slow
 def test_what_refuses_nothing_is_weighed(label: Label) -> None:
     """However fast it is, and however well that is known, an obstacle refuses candidates or costs them something."""
     count, least_mps = 0, SWIMMING_MPS if label is Label.PERSON else UNDER_WAY_MPS[1]

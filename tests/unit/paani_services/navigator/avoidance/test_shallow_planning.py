@@ -80,6 +80,7 @@ def test_people_see_the_shallow_water_on_the_grid_and_the_depth() -> None:
 
 
 @given(st.lists(st.tuples(st.integers(-25, 25), st.integers(-25, 25)), max_size=40))
+@pytest.mark.slow
 def test_no_candidate_has_more_room_with_soundings_than_without(numbers: Numbers) -> None:
     grid, obstacles = map_water(observe_from().observations, (0.0, 0.0), START_US, CAMERA, PLANNER)
     start = BoatState(0.0, 0.0, 0.0, 0.6, 0.0, 0.0)

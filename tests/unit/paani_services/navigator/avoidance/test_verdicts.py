@@ -59,6 +59,7 @@ def total(verdict: HeadingVerdict) -> float:
     surge=st.floats(0.0, 0.6),
     side=st.sampled_from([-1.0, 0.0, 1.0]),
 )
+@pytest.mark.slow
 def test_the_plan_is_the_cheapest_heading_that_nothing_refuses(
     bars: list[tuple[float, float, float, float]],
     place: tuple[float, float],
@@ -104,6 +105,7 @@ def test_in_open_water_the_course_costs_nothing_and_others_by_name() -> None:
 
 @settings(max_examples=25, deadline=None)
 @given(side=st.sampled_from([1.0, -1.0]), turn_deg=st.floats(20.0, 179.0), speed=st.sampled_from([0, 1, 2]))
+@pytest.mark.slow
 def test_to_turn_the_other_way_costs_more_than_to_go_straight_on(side: float, turn_deg: float, speed: int) -> None:
     """Though its heading lies beside that of the plan before: what was turned is undone first."""
     water, before = basin(wall(range(0))), Plan(side * math.radians(turn_deg), 0.6)

@@ -127,6 +127,7 @@ def test_fence_and_land_share_their_corners(tmp_path: Path) -> None:
         load_route_and_mission(config, ORIGIN)
 
 
+@pytest.mark.slow
 def test_a_route_is_checked_against_land_before_the_boat_starts(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -38,6 +38,7 @@ def max_cross_track_m(config: NavigatorConfig, drift_mps: tuple[float, float], s
 
 
 @pytest.mark.parametrize("drift_mps", [(0.0, 0.15), (0.0, -0.2), (0.1, 0.2)])
+@pytest.mark.slow
 def test_a_steady_drift_leaves_no_cross_track_error(drift_mps: tuple[float, float]) -> None:
     assert max_cross_track_m(WITHOUT_INTEGRAL, drift_mps) > 0.7
     assert max_cross_track_m(PAANI, drift_mps) < 0.05
@@ -59,6 +60,7 @@ def test_m4_the_paper_s_bearing_has_no_integral() -> None:
     assert boat.state.ilos.north_m == 0.0
 
 
+@pytest.mark.slow
 def test_the_integral_holds_on_a_leg_in_the_opposite_direction() -> None:
     """A drift comes from one side of the map, so the integral changes its sign with the direction of the leg."""
     boat = DriftingBoat(mission_of_route(route((0, 0), (60, 0), (60, 3), (0, 3))), PAANI, drift_mps=(0.0, 0.15))
@@ -70,6 +72,7 @@ def test_the_integral_holds_on_a_leg_in_the_opposite_direction() -> None:
     assert worst_m < 0.4
 
 
+@pytest.mark.slow
 def test_the_crab_angle_is_bounded() -> None:
     """In a drift that the boat cannot hold against, the integral does not wind up without end."""
     boat = DriftingBoat(mission_of_route(STRAIGHT), PAANI, drift_mps=(0.0, 0.9))
@@ -94,6 +97,7 @@ def test_a_gap_in_time_is_integrated_as_a_short_step() -> None:
 
 
 @pytest.mark.parametrize("off_m", [2.0, 5.0, 10.0])
+@pytest.mark.slow
 def test_the_integral_is_held_while_the_boat_closes_in_on_its_leg(off_m: float) -> None:
     """A cross-path error that shrinks is no drift: the boat joins from afar and overshoots by no more than 0.2 m."""
     boat = DriftingBoat(mission_of_route(STRAIGHT), PAANI, (0.0, off_m))

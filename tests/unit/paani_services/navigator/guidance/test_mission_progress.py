@@ -50,6 +50,7 @@ def until(ship: DriftingBoat, leg: int, limit_s: float = 300.0) -> float:
     raise AssertionError(f"leg {leg} was not reached in {limit_s} s")
 
 
+@pytest.mark.slow
 def test_a_mission_of_route_station_and_home_is_done_at_home() -> None:
     """A route, half a minute on station, then home, which is where the boat was first armed; then nothing is left."""
     ship = boat(follow((0, 0), (20, 0)), hold(at(20, 10), duration_s=30.0), HOME, at_m=(-3.0, 1.0))
@@ -72,6 +73,7 @@ def test_a_mission_that_is_done_stays_done_whatever_is_advised(direction: Direct
     assert Inhibit.MISSION_DONE in ship.settle(0.1).inhibits
 
 
+@pytest.mark.slow
 def test_m3_laps_of_a_route_that_repeats() -> None:
     """M3: two laps reach as many waypoints as two laps have; then the next leg is due."""
     ship = boat(follow(*SQUARE, repeat=True, laps=2), STOP, at_m=(5.0, 0.0))
@@ -90,6 +92,7 @@ def test_the_order_names_the_lap() -> None:
     assert ship.order.leg == "follow route, lap 2 of 3"
 
 
+@pytest.mark.slow
 def test_on_station_there_is_no_thrust_until_the_boat_leaves_the_radius() -> None:
     """Beyond the radius the boat comes back at half its speed until half the radius, then has no thrust again."""
     ship = boat(hold(radius_m=4.0), drift_mps=(0.1, 0.05))
@@ -175,6 +178,7 @@ def test_a_boat_at_home_returns_home_at_once() -> None:
     st.permutations([follow(*SQUARE, repeat=True), hold(duration_s=3.0), hold(at(3, 3)), HOME, STOP]),
 )
 @settings(max_examples=25, deadline=None)
+@pytest.mark.slow
 def test_the_state_survives_json_and_an_order_that_moves_has_no_inhibits(
     events: list[Direction | str], legs: list[MissionLeg]
 ) -> None:

@@ -226,6 +226,7 @@ def test_an_obstacle_out_of_sight_is_predicted_and_occupies_where_it_was_last_se
     assert later[0] < now[0]
 
 
+@pytest.mark.slow
 def test_an_obstacle_cut_by_the_picture_s_side_stays_occupied() -> None:
     """It moved when last seen whole; where later pictures show part of it stays occupied, however long that lasts."""
     memory, at_us, boat = watched((4.5, 1.6), (0.0, 0.35), surge_mps=0.0)
@@ -307,6 +308,7 @@ def test_a_track_goes_on_with_its_own_label_within_the_time_that_is_fitted(
 
 @settings(max_examples=25)
 @given(labels=st.lists(st.sampled_from([Label.VESSEL, Label.BUOY]), min_size=12, max_size=12))
+@pytest.mark.slow
 def test_what_comes_is_known_by_its_motion_whatever_each_picture_takes_it_for(labels: list[Label]) -> None:
     """A hull that comes at 1.5 m/s from 10 m off, in pictures 0.2 s apart, is met as one that moves."""
     memory, at_us = ObservationMemory(), START_US

@@ -57,6 +57,7 @@ def cell(grid: OccupancyGrid, x_m: float, y_m: float) -> str:
     roll=st.floats(-0.2, 0.2),
     pitch=st.floats(-0.05, 0.1),
 )
+@pytest.mark.slow
 def test_q1_a_pixel_of_the_water_comes_back_to_its_point(
     ahead_m: float, aside: float, yaw: float, roll: float, pitch: float
 ) -> None:

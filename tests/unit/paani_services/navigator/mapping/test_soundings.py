@@ -73,6 +73,7 @@ def rising(slope: float, shallow_at_m: float) -> Bottom:
 
 
 @given(st.floats(0.1, 0.6), st.floats(5.0, 9.0))
+@pytest.mark.slow
 def test_shallow_water_is_expected_where_the_bottom_leads_to_before_the_boat_can_only_just_stop(
     slope: float, shallow_at_m: float
 ) -> None:
@@ -91,6 +92,7 @@ def test_shallow_water_is_expected_where_the_bottom_leads_to_before_the_boat_can
 
 
 @given(st.floats(0.65, 30.0), st.integers(0, 100))
+@pytest.mark.slow
 def test_a_level_bottom_that_is_deep_enough_is_no_obstacle(depth_m: float, first: int) -> None:
     survey = Survey()
     survey.steps = first
@@ -110,6 +112,7 @@ def test_what_was_sounded_shallow_stays_an_obstacle() -> None:
     assert set(sounded) <= {x_m for x_m, _ in survey.places()}
 
 
+@pytest.mark.slow
 def test_what_was_only_expected_is_forgotten_in_time() -> None:
     survey = Survey()
     survey.sail(26, rising(0.3, 5.0))
@@ -204,6 +207,7 @@ def test_a_jump_is_named_and_believed_once_three_soundings_bear_it_out() -> None
 
 
 @given(st.lists(st.integers(1, 3), min_size=30, max_size=30))
+@pytest.mark.slow
 def test_a_sonar_that_raves_is_never_believed(steps: list[int]) -> None:
     survey = Survey()
     survey.sail(10, level(3.0))
