@@ -37,9 +37,7 @@ YAW_GATE2 = 9.0  # validation gate of the compass, squared sigmas: at 20 Hz a re
 COMPASS_BIAS_STD_RAD = 0.05  # at start, 3 degrees: an adjusted small compass on a small boat
 COMPASS_DOUBT_S, COMPASS_DOUBT_RAD = 1.0, 0.1  # refused for so long, compass or gyro has changed by about so much
 HEADING_DOUBT_S = 1.1  # of refusals, less what was accepted: more than a step of the compass takes to be followed
-MAX_COMPASS_BIAS_RAD = (
-    0.35  # 20 degrees; what seems to be farther off is a gyro that turns wrongly, or a broken compass
-)
+MAX_COMPASS_BIAS_RAD = 0.35  # 20 degrees; what seems to be farther off is a gyro or a compass that is broken
 COMPASS_AGE_S = 3.0  # without a compass for longer, the heading is a guess, even if the course makes it look sure (A12)
 COURSE_MPS = 0.3  # at a lower speed the course over ground says nothing of the heading
 # The part of a fix's standard deviation that is noise from fix to fix is estimated; the rest wanders slowly.
@@ -126,7 +124,7 @@ class Estimator:
             return
         before_us = self._last_imu.source_us if self._last_imu else 0
         step_s = (newest.source_us - before_us) * 1e-6
-        if longest_gap_s(samples, before_us) > MAX_SAMPLE_GAP_S:
+        if _longest_gap_s(samples, before_us) > MAX_SAMPLE_GAP_S:
             self._bridge_imu_gap(step_s)
             step_s = NOMINAL_GAP_S * len(samples)
         self._last_imu = newest
@@ -158,8 +156,8 @@ class Estimator:
         """
         is_accepted = global_filter.correct_yaw(yaw_rad, YAW_STD_RAD, YAW_GATE2).is_accepted
         self._disagreement_s = clip(self._disagreement_s + (-step_s if is_accepted else step_s), 0.0, HEADING_DOUBT_S)
-        doubted_from_s = 0.0 if self._is_heading_doubted else HEADING_DOUBT_S - 1e-6
-        self._is_heading_doubted = self._disagreement_s > doubted_from_s
+        if self._disagreement_s in {0.0, HEADING_DOUBT_S}:
+            self._is_heading_doubted = self._disagreement_s > 0.0
         if is_accepted:
             self._compass_refused_s = 0.0
             return
@@ -316,7 +314,7 @@ class Estimator:
         return odometry_of(source, self._last_imu, now_us, healthy=healthy, stopped=self._stopped.is_set(now_us))
 
 
-def longest_gap_s(samples: Sequence[ImuSample], before_us: int) -> float:
+def _longest_gap_s(samples: Sequence[ImuSample], before_us: int) -> float:
     """The longest time between two samples in a row, the one before them included."""
     times_us = (before_us, *(each.source_us for each in samples))
     return max(later - earlier for earlier, later in itertools.pairwise(times_us)) * 1e-6

@@ -10,7 +10,7 @@ from paani_services.mavlink import commands
 from paani_services.mavlink.codec import dialect
 from paani_services.mavlink.fields import integer, to_int
 from paani_services.mavlink.rtsp import PATH
-from paani_services.mavlink.station import Station
+from paani_services.mavlink.station import Source, Station
 
 CAMERA_COMPONENT = dialect.MAV_COMP_ID_CAMERA
 STREAM = 1
@@ -57,7 +57,7 @@ class Camera:
             message = dialect.MAVLink_heartbeat_message(kind, none, 0, 0, dialect.MAV_STATE_ACTIVE, 3)
             station.send(message, now_us, CAMERA_COMPONENT)
 
-    def receive(self, station: Station, message: Any, source: tuple[int, int], now_us: int, boot_ms: int) -> None:
+    def receive(self, station: Station, message: Any, source: Source, now_us: int, boot_ms: int) -> None:
         """Answer a command to the camera, which does nothing but say what it is."""
         if message.get_type() not in {"COMMAND_LONG", "COMMAND_INT"} or not self.uri(station):
             return

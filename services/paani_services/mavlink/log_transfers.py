@@ -14,7 +14,7 @@ from paani_services.mavlink import commands
 from paani_services.mavlink.codec import dialect
 from paani_services.mavlink.fields import U16_MAX, U32_MAX
 from paani_services.mavlink.snapshot import Snapshot
-from paani_services.mavlink.station import Station
+from paani_services.mavlink.station import Source, Station
 
 CHUNK_BYTES = 90  # of LOG_DATA
 CHUNKS_PER_TURN = 40  # 180 kB/s of a recording at 50 turns a second, for all stations together
@@ -64,7 +64,7 @@ class LogTransfers:
         self._now_us = 0
         self._files: dict[Station, tuple[LogFile, ...]] = {}
         self._requests: dict[Station, ListRequest | DataRequest] = {}  # whose turn is next comes first
-        self.handlers: dict[str, Callable[[Station, Any, tuple[int, int]], None]] = {
+        self.handlers: dict[str, Callable[[Station, Any, Source], None]] = {
             "LOG_REQUEST_LIST": self._request_list,
             "LOG_REQUEST_DATA": self._request_data,
             "LOG_REQUEST_END": self._end,
@@ -133,7 +133,7 @@ class LogTransfers:
         if rest is not None:
             self._requests[station] = rest
 
-    def _request_list(self, station: Station, message: Any, _: tuple[int, int]) -> None:
+    def _request_list(self, station: Station, message: Any, _: Source) -> None:
         """A list from its beginning to its end is a new one; a part of it is of the list that the station has."""
         if not self._is_trusted(station, message):
             self._refuse(station, commands.NOT_TRUSTED)
@@ -143,7 +143,7 @@ class LogTransfers:
         is_part = message.start > 1 or message.end < len(known)
         self._put(station, ListRequest(message.start, message.end or U16_MAX, is_known=bool(known) and is_part))
 
-    def _request_data(self, station: Station, message: Any, _: tuple[int, int]) -> None:
+    def _request_data(self, station: Station, message: Any, _: Source) -> None:
         """A request takes the place of the one before."""
         files = self._files.get(station, ())
         is_trusted = self._is_trusted(station, message)
@@ -158,10 +158,10 @@ class LogTransfers:
         """A station keeps its turn, however often it asks."""
         self._requests[station] = request
 
-    def _end(self, station: Station, _: Any, __: tuple[int, int]) -> None:
+    def _end(self, station: Station, _: Any, __: Source) -> None:
         self._requests.pop(station, None)
 
-    def _refuse_erasing(self, station: Station, _: Any, __: tuple[int, int]) -> None:
+    def _refuse_erasing(self, station: Station, _: Any, __: Source) -> None:
         self._refuse(station, NO_ERASING)
 
     def _refuse(self, station: Station, text: str) -> None:

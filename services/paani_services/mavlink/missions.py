@@ -17,6 +17,7 @@ from paani_services.mavlink.fields import U16_MAX, degrees_e7
 from paani_services.mavlink.mission_items import Item, Legs
 from paani_services.mavlink.rover_modes import Mode, mode_of
 from paani_services.mavlink.snapshot import Snapshot
+from paani_services.mavlink.station import Source
 
 MISSION, FENCE, RALLY, ALL = 0, 1, 2, 255  # mission_type
 GLOBAL, RELATIVE = dialect.MAV_FRAME_GLOBAL, dialect.MAV_FRAME_GLOBAL_RELATIVE_ALT
@@ -105,12 +106,12 @@ def _fence_items(fence: tuple[m.FenceArea, ...], place: Place) -> tuple[Item, ..
     )
 
 
-def mission_count(plan: Plan, kind: int, target: tuple[int, int]) -> Any:
+def mission_count(plan: Plan, kind: int, target: Source) -> Any:
     """The answer to a request for the list of a type that there is."""
     return dialect.MAVLink_mission_count_message(*target, len(plan.items[kind]), kind)
 
 
-def mission_item(plan: Plan, kind: int, seq: int, current: int, target: tuple[int, int]) -> Any | None:
+def mission_item(plan: Plan, kind: int, seq: int, current: int, target: Source) -> Any | None:
     """The answer to a request for one item; None where there is none of this number."""
     items = plan.items[kind]
     if not 0 <= seq < len(items):

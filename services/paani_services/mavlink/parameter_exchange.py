@@ -25,7 +25,7 @@ from paani_services.mavlink.parameters import (
     written_text,
 )
 from paani_services.mavlink.snapshot import Snapshot
-from paani_services.mavlink.station import PARAMETERS_PER_TICK, Station
+from paani_services.mavlink.station import PARAMETERS_PER_TICK, Source, Station
 
 UNKNOWN, READ_ONLY = dialect.MAV_PARAM_ERROR_DOES_NOT_EXIST, dialect.MAV_PARAM_ERROR_READ_ONLY
 DENIED, RANGE = dialect.MAV_PARAM_ERROR_PERMISSION_DENIED, dialect.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE
@@ -35,7 +35,7 @@ class ParameterWrite(NamedTuple):
     """What a station asks to have tried: the setting, its value as text, and who is told how that ended."""
 
     station: Station
-    target: tuple[int, int]
+    target: Source
     name: str
     path: str
     text: str
@@ -57,7 +57,7 @@ class ParameterExchange:
         self._snapshot = Snapshot(now_us=0)
         self._changes: tuple[m.Change, ...] | None = None
         self._values: dict[str, float] = {}
-        self.handlers: dict[str, Callable[[Station, Any, tuple[int, int]], None]] = {
+        self.handlers: dict[str, Callable[[Station, Any, Source], None]] = {
             "PARAM_REQUEST_LIST": self._request_list,
             "PARAM_REQUEST_READ": self._request_read,
             "PARAM_SET": self._set,
@@ -92,10 +92,10 @@ class ParameterExchange:
     def _parameters(self) -> tuple[Parameter, ...]:
         return parameters_of(self._snapshot, self._cruise_mps, self._advisor)
 
-    def _request_list(self, station: Station, _: Any, __: tuple[int, int]) -> None:
+    def _request_list(self, station: Station, _: Any, __: Source) -> None:
         station.next_parameter = 0
 
-    def _request_read(self, station: Station, message: Any, source: tuple[int, int]) -> None:
+    def _request_read(self, station: Station, message: Any, source: Source) -> None:
         parameters, index = self._parameters, message.param_index
         by_name, name = index < 0, text_of(message.param_id)
         found = find(parameters, name) if by_name else index
@@ -104,7 +104,7 @@ class ParameterExchange:
         elif by_name:
             station.send(param_error(name, source, UNKNOWN), self._snapshot.now_us)
 
-    def _set(self, station: Station, message: Any, source: tuple[int, int]) -> None:
+    def _set(self, station: Station, message: Any, source: Source) -> None:
         parameters, name = self._parameters, text_of(message.param_id)
         found = find(parameters, name)
         if found is None:
@@ -125,7 +125,7 @@ class ParameterExchange:
         shadow = self._snapshot.shadow
         return shadow is not None and path in {each.path for each in shadow.changes}
 
-    def _refuse(self, station: Station, target: tuple[int, int], name: str, error: int, text: str) -> None:
+    def _refuse(self, station: Station, target: Source, name: str, error: int, text: str) -> None:
         self._count("mavlink_refused")
         station.refuse(text, self._snapshot.now_us)
         station.send(param_error(name, target, error), self._snapshot.now_us)

@@ -10,6 +10,7 @@ from paani.config import AdvisorConfig
 from paani.config.tuning import TUNABLE, setting_text
 from paani_services.mavlink.codec import SYSTEM, dialect
 from paani_services.mavlink.snapshot import Snapshot
+from paani_services.mavlink.station import Source
 
 NAME_BYTES = 16
 REAL, INTEGER = dialect.MAV_PARAM_TYPE_REAL32, dialect.MAV_PARAM_TYPE_INT32
@@ -102,7 +103,7 @@ def is_in_force(parameters: tuple[Parameter, ...], index: int, value: float) -> 
     return _is_same_float32(parameters[index].value, value)
 
 
-def param_error(name: str, target: tuple[int, int], error: int) -> Any:
+def param_error(name: str, target: Source, error: int) -> Any:
     """Why a parameter was not read or written; stations that do not know this message go by the value."""
     return dialect.MAVLink_param_error_message(*target, name.encode("ascii", "replace")[:NAME_BYTES], -1, error)
 

@@ -104,7 +104,7 @@ class Station:
             return True
         return False
 
-    def acknowledge(self, command: int, result: int, target: tuple[int, int], now_us: int, text: str = "") -> None:
+    def acknowledge(self, command: int, result: int, target: Source, now_us: int, text: str = "") -> None:
         """The text first, as stations show the last they had with the result."""
         self.refuse(text, now_us)
         self.send(dialect.MAVLink_command_ack_message(command, result, 0, 0, *target), now_us)

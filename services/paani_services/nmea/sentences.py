@@ -6,6 +6,7 @@ A field that is not known is empty, as the standard has it; nothing is said of w
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 import operator
 from datetime import UTC, datetime
@@ -50,9 +51,7 @@ def target_sentences(odometry: m.Odometry | None, prediction: m.Prediction | Non
         return []
     lines, numbers = [], set[int]()
     for obstacle in prediction.obstacles[:MAX_TARGETS]:
-        number = (
-            next(each for each in range(obstacle.track_id, obstacle.track_id + 100) if each % 100 not in numbers) % 100
-        )
+        number = next(each % 100 for each in itertools.count(obstacle.track_id) if each % 100 not in numbers)
         numbers.add(number)
         east_m, north_m = obstacle.x_m - odometry.x_m, obstacle.y_m - odometry.y_m
         distance = f"{math.hypot(east_m, north_m) / METRES_PER_NAUTICAL_MILE:.4f}"

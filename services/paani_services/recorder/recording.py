@@ -98,9 +98,10 @@ class Recording:
         """Delete the oldest recordings beyond the budget; pause recording while the disk has too little space left."""
         found = recordings(self._folder)
         kept = sum(recording.size_bytes for recording in found if recording.kept)
-        others = [each for each in found if each.path != self.path and not is_being_written(each.path)]
+        others = [recording for recording in found if recording.path != self.path]
         for path in too_old(others, self._settings.budget_mib * MIB - self.size_bytes):
-            path.unlink(missing_ok=True)
+            if not is_being_written(path):
+                path.unlink(missing_ok=True)
         self.free_bytes = shutil.disk_usage(self._folder).free
         problem = ""
         if self.free_bytes < self._settings.min_free_mib * MIB:

@@ -133,7 +133,7 @@ class Recomputation:
         return True
 
     def _recompute(self, given: RecordedStep) -> RecomputedStep:
-        step, same = given.step, None
+        step, same, schemas = given.step, None, self._losses.schemas
         if step.state:
             try:
                 recorded = self._states.decode(step.state)
@@ -156,16 +156,17 @@ class Recomputation:
         try:
             self._state, outputs = self._decider.decide(self._state, given.inputs, step.source_us, self._config)
             compared = tuple(
-                (sent, recorded, self._as_recorded(sent, self._encoded(sent, outputs[sent.topic]), recorded))
+                (
+                    sent,
+                    recorded,
+                    as_recorded(self._encoded(sent, outputs[sent.topic]), recorded, schemas.get(sent.topic)),
+                )
                 for sent, recorded in given.sent
             )
         except Exception as error:  # noqa: BLE001  # a log may hold what no live process could have been given
             self._lose(SkipReason.AFTER_BREAK, None)
             return RecomputedStep(given, skip=SkipReason.FAILED, detail=f"{type(error).__name__}: {error}")
         return RecomputedStep(given, compared, state_same=same)
-
-    def _as_recorded(self, sent: m.OutputMessage, computed: bytes, recorded: bytes | None) -> bytes:
-        return as_recorded(computed, recorded, self._losses.schemas.get(sent.topic))
 
     def _encoded(self, sent: m.OutputMessage, message: m.Message) -> bytes:
         """As the bus would have sent it, with the header that the step has kept."""
