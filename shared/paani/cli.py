@@ -53,28 +53,18 @@ def main(argv: list[str] | None = None) -> int:
     except OSError as error:
         if error.errno not in {errno.EPIPE, errno.ENOSPC}:
             raise
-        _forget_output()
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         if error.errno == errno.EPIPE:
             return UNREAD
         sys.stderr.write(f"paani: {error.strerror}\n")
         return 1
 
 
-def _forget_output() -> None:
-    """Nobody reads standard output any more: the rest of it goes nowhere."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
 def _run(name: str, rest: list[str], commands: dict[str, EntryPoint]) -> int:
     try:
         if name in commands:
             code = int(commands[name].load()(rest))
-            try:
-                sys.stdout.flush()  # what cannot be written is said now, not by the interpreter at its end
-            except BrokenPipeError:
-                if code == 0:
-                    raise
-                _forget_output()
+            sys.stdout.flush()  # what cannot be written is said now, not by the interpreter at its end
             return code
         return run_service(name, _service_config(name, rest))
     except ModuleNotFoundError as error:

@@ -148,20 +148,20 @@ def test_beyond_the_budget_the_oldest_recording_is_deleted_unless_kept(tmp_path:
 
 @pytest.mark.slow
 def test_no_recorder_deletes_what_another_is_writing(tmp_path: Path) -> None:
-    """Two of them in one folder, with room for less than either has."""
+    """Two of them in one folder, with room for either and not for both."""
     size = finished(tmp_path, name="20200101T000000Z-1.mcap").stat().st_size
-    few = settings(tmp_path, budget_mib=0.5 * size / 2**20)
+    few = settings(tmp_path, budget_mib=1.5 * size / 2**20)
     one, other = (Recording(few, describe_system(Config()), TOPICS) for _ in range(2))
-    record(one, range(10))
-    record(other, range(20, 30))
-    record(one, range(40, 50))
+    record(one, range(400))
+    record(other, range(400, 800))
     assert one.path is not None
     assert one.path.exists()
     assert other.path is not None
     assert other.path.exists()
+    assert one.size_bytes + other.size_bytes > few.budget_mib * 2**20
     assert "20200101T000000Z-1.mcap" not in names(tmp_path)
     for recording in (one, other):
-        recording.close([], now_us(50))
+        recording.close([], now_us(800))
 
 
 def test_kept_recordings_that_fill_the_budget_end_the_recording(tmp_path: Path) -> None:
