@@ -219,7 +219,11 @@ class Config(Section, frozen=True):
 
     def _require_lines(self) -> None:
         """A line has one user, and a recording guides no boat that moves."""
-        autopilot = self.thrusters.autopilot.line
+        autopilot, source = self.thrusters.autopilot.line, self.camera.source
+        is_moved = self.thrusters.line and not is_emulated(self.thrusters.line)
+        way = "thrusters.autopilot.line" if autopilot else "thrusters.line" if is_moved else ""
+        if way and source != "sim" and source.partition(":")[0] != "webcam":
+            raise ValueError(f"camera.source {source}: a recording is no camera of a boat that moves ({way} is set)")
         for role, line in self.sensors.lines.items():
             name = f"sensors.{role}.line"
             for other, taken in (
@@ -229,9 +233,7 @@ class Config(Section, frozen=True):
             ):
                 if line and line.partition("@")[0] == taken.partition("@")[0]:
                     raise ValueError(f"{name} {line}: is also {other}; a sensor needs a line of its own")
-            moves = autopilot or (self.thrusters.line and not is_emulated(self.thrusters.line))
-            if line.startswith("file:") and moves:
-                way = "thrusters.autopilot.line" if autopilot else "thrusters.line"
+            if way and line.startswith("file:"):
                 raise ValueError(f"{name} {line}: a recording is no sensor of a boat that moves ({way} is set)")
 
 

@@ -50,3 +50,15 @@ def test_a_recording_guides_no_boat_that_moves(device: str) -> None:
             load_config(profile="hull", sets=(recording, way))
     load_config(profile="hull", sets=(recording,))
     load_config(profile="hull", sets=(recording, "thrusters.line=serial:/dev/pts/7"))  # an emulator moves nothing
+
+
+@pytest.mark.parametrize("source", ["trip.mp4", "pictures", "webcam.mp4"])
+def test_a_film_guides_no_boat_that_moves(source: str) -> None:
+    film = f"camera.source={source}"
+    for way in ("thrusters.line=serial:/dev/ttyACM0", "thrusters.autopilot.line=socket://127.0.0.1:5"):
+        with pytest.raises(UserError, match=rf"camera\.source {source}: a recording .*{way.partition('=')[0]} is set"):
+            load_config(profile="hull", sets=(film, way))
+        for camera in ("webcam", "webcam:1"):
+            load_config(profile="hull", sets=(f"camera.source={camera}", way))
+    load_config(profile="hull", sets=(film,))
+    load_config(profile="hull", sets=(film, "thrusters.line=serial:/dev/pts/7"))  # an emulator moves nothing
