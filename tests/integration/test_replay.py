@@ -104,14 +104,14 @@ def test_twenty_repeats_are_one() -> None:
     from paani.decider import decider_of  # noqa: PLC0415
     from paani_tools.replay.check import check_service  # noqa: PLC0415
     from paani_tools.replay.ledger import Ledger  # noqa: PLC0415
-    from paani_tools.replay.recompute import Losses  # noqa: PLC0415
+    from paani_tools.replay.recompute import RecordingFacts  # noqa: PLC0415
     from tests.unit.paani_tools.replay.recorded_drive import CONFIG  # noqa: PLC0415
 
     records = drive(10.0)
     for service in keys.DECIDING_SERVICES:
         decider = decider_of(service)
         mine = [r for r in records if r.topic in Ledger(decider).topics]
-        checks = [check_service(decider, CONFIG, mine, Losses({}, ())) for _ in range(20)]
+        checks = [check_service(decider, CONFIG, mine, RecordingFacts({}, ())) for _ in range(20)]
         assert all(result.is_exact for result in checks)
         assert len({result.digest for result in checks}) == 1
 

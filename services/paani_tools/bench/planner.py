@@ -25,7 +25,7 @@ from paani_services.navigator.mapping.water_map import map_water
 from paani_tools.replay.compatibility import provenance_of
 from paani_tools.replay.ledger import Ledger
 from paani_tools.replay.recompute import Recomputation
-from paani_tools.replay.verify import losses_of
+from paani_tools.replay.verify import recording_facts
 
 OBSTACLES = 12  # the bar of the planning step is for so many
 MEMORY_S = 33.0  # of pictures before the first step that counts: nothing that is remembered is older
@@ -100,7 +100,7 @@ def _recorded_plans(drive: Path) -> Iterator[tuple[float, int]]:
     """The time of each step that made a plan, and how many obstacles with a track that was for."""
     log, decider = open_log(drive), decider_of("navigator")
     config = provenance_of(log, force=True).config
-    again = Recomputation(decider, config, losses_of(log), evolve=True)
+    again = Recomputation(decider, config, recording_facts(log), evolve=True)
     steps, planned_us = again.steps(log.records(Ledger(decider).topics)), 0
     while True:
         begin_s = process_cpu_s()

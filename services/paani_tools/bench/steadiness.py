@@ -19,7 +19,7 @@ from paani.undecodable import UNDECODABLE
 from paani_tools.replay.compatibility import provenance_of
 from paani_tools.replay.ledger import Ledger
 from paani_tools.replay.recompute import Recomputation
-from paani_tools.replay.verify import losses_of
+from paani_tools.replay.verify import recording_facts
 
 STEADYING = ("advisor.policy.release_margin", "advisor.policy.side_change_margin")
 WITHOUT = tuple(f"{path}=0" for path in STEADYING)
@@ -81,7 +81,7 @@ def _recorded_advice(log: Log) -> Iterator[m.Advisory]:
 def _advice_by(log: Log, config: Config) -> tuple[m.Advisory, ...]:
     """What each recorded step of the advisor says with these settings, on what it had been given."""
     decider, decoder = decider_of("advisor"), msgspec.json.Decoder(m.Advisory)
-    again = Recomputation(decider, config, losses_of(log), evolve=True)
+    again = Recomputation(decider, config, recording_facts(log), evolve=True)
     return tuple(
         decoder.decode(computed)
         for step in again.steps(log.records(Ledger(decider).topics))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import asyncio
-import itertools
 import math
 import sys
 
@@ -74,30 +73,50 @@ async def _echo(config: BusConfig, name: str, count: int | None) -> None:
 
 async def _hz(config: BusConfig, name: str, seconds: float) -> None:
     topic = topic_named(name)
-    arrivals_ms: list[float] = []
+    arrivals = Arrivals()
     async with observer(config) as bus, asyncio.TaskGroup() as group:
 
         async def note() -> None:
             async for _ in messages(bus, topic):
-                arrivals_ms.append(stopwatch_ms())
+                arrivals.add(stopwatch_ms())
 
         noting = group.create_task(note())
         left_s = seconds
         while left_s > 0:
             await asyncio.sleep(min(1.0, left_s))
             left_s -= 1.0
-            sys.stdout.write(f"{rate_line(arrivals_ms, topic.rate_hz)}\n")
+            sys.stdout.write(f"{arrivals.text(stopwatch_ms(), topic.rate_hz)}\n")
             sys.stdout.flush()
         noting.cancel()
 
 
-def rate_line(arrivals_ms: list[float], nominal_hz: float) -> str:
-    """Mean rate and spread of the gaps between arrivals so far."""
-    gaps_ms = [after - before for before, after in itertools.pairwise(arrivals_ms)]
-    if not gaps_ms:
-        return f"{len(arrivals_ms)} messages (nominal {nominal_hz:g} Hz)"
-    mean_ms = sum(gaps_ms) / len(gaps_ms)
-    return (
-        f"{1e3 / mean_ms:.2f} Hz (nominal {nominal_hz:g} Hz), gaps {min(gaps_ms):.0f} to {max(gaps_ms):.0f} ms, "
-        f"{len(arrivals_ms)} messages"
-    )
+class Arrivals:
+    """When messages of one topic arrived [ms]."""
+
+    def __init__(self) -> None:
+        self._count = 0
+        self._first_ms = self._last_ms = 0.0
+        self._least_gap_ms, self._largest_gap_ms = math.inf, 0.0
+
+    def add(self, at_ms: float) -> None:
+        if self._count:
+            gap_ms = at_ms - self._last_ms
+            self._least_gap_ms = min(self._least_gap_ms, gap_ms)
+            self._largest_gap_ms = max(self._largest_gap_ms, gap_ms)
+        else:
+            self._first_ms = at_ms
+        self._last_ms = at_ms
+        self._count += 1
+
+    def text(self, now_ms: float, nominal_hz: float) -> str:
+        """Mean rate and spread of the gaps so far; a silence longer than any of them counts in the rate."""
+        silent_ms = now_ms - self._last_ms if self._count else 0.0
+        is_silent = silent_ms > max(self._largest_gap_ms, 1e3 / nominal_hz)
+        silence = f", silent for {silent_ms * 1e-3:.1f} s" if is_silent else ""
+        if self._count < 2:
+            return f"{self._count} messages (nominal {nominal_hz:g} Hz){silence}"
+        span_ms = (now_ms if is_silent else self._last_ms) - self._first_ms
+        return (
+            f"{1e3 * (self._count - 1) / span_ms:.2f} Hz (nominal {nominal_hz:g} Hz),"
+            f" gaps {self._least_gap_ms:.0f} to {self._largest_gap_ms:.0f} ms, {self._count} messages{silence}"
+        )

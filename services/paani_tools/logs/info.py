@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import bisect
 import datetime
 import re
 from collections.abc import Callable, Iterable
@@ -64,16 +65,20 @@ class Manifest(msgspec.Struct):
 
 
 class ChannelTimes:
-    """First, last and longest silence of one channel."""
+    """How often one channel spoke, and its longest silence, of the time within recordings and not between them."""
 
     def __init__(self, at_us: int) -> None:
-        self.first_us = self.last_us = at_us
-        self.gap_us = 0
-        self.messages = 1
+        self.messages, self.gaps = 1, 0
+        self.gap_us = self.spoken_us = 0
+        self._last_us = at_us
 
-    def add(self, at_us: int) -> None:
-        self.gap_us = max(self.gap_us, at_us - self.last_us)
-        self.last_us = at_us
+    def add(self, at_us: int, begun_us: int) -> None:
+        """A message of the recording that began at `begun_us`."""
+        if self._last_us >= begun_us:
+            self.gap_us = max(self.gap_us, at_us - self._last_us)
+            self.spoken_us += at_us - self._last_us
+            self.gaps += 1
+        self._last_us = at_us
         self.messages += 1
 
 
@@ -81,10 +86,12 @@ def info_of(log: Log, seen: Callable[[Record], None] = lambda record: None) -> L
     """Reads all of it. `seen` is told every record, for whoever shows progress."""
     channels: dict[str, ChannelTimes] = {}
     directions = DirectionChanges()
+    begins_us = sorted(start_us for start_us, _ in log.recordings)
     for record in log.records():
         seen(record)
         if record.topic in channels:
-            channels[record.topic].add(record.log_us)
+            begun = bisect.bisect_right(begins_us, record.log_us) - 1
+            channels[record.topic].add(record.log_us, begins_us[begun] if begun >= 0 else 0)
         else:
             channels[record.topic] = ChannelTimes(record.log_us)
         if record.topic == keys.ADVISORY.name:
@@ -104,7 +111,7 @@ def info_of(log: Log, seen: Callable[[Record], None] = lambda record: None) -> L
             TopicInfo(
                 topic=name,
                 messages=one.messages,
-                rate_hz=round((one.messages - 1) * 1e6 / max(one.last_us - one.first_us, 1), 2),
+                rate_hz=round(one.gaps * 1e6 / max(one.spoken_us, 1), 2),
                 gap_s=round(one.gap_us * 1e-6, 3),
                 dropped=_sum(DROPPED, lost, name),
                 missing=_sum(MISSING, lost, name),

@@ -14,7 +14,7 @@ from paani.config import Config
 from paani.decider import Decider
 from paani.logs.reader import Record
 from paani_tools.replay.difference import Difference, first_difference
-from paani_tools.replay.recompute import ExpectedGap, Losses, Recomputation, RecomputedStep
+from paani_tools.replay.recompute import ExpectedGap, Recomputation, RecomputedStep, RecordingFacts
 
 SHOWN = 20
 
@@ -63,15 +63,15 @@ def check_service(
     decider: Decider[Any],
     config: Config,
     records: Iterable[Record],
-    losses: Losses,
+    facts: RecordingFacts,
     on_step: StepCallback | None = None,
 ) -> ServiceCheck:
     """Compute every step of one service again and compare.
 
     records: those of `Ledger(decider).topics`. digest: SHA-256 of all bytes computed.
     """
-    recompute = Recomputation(decider, config, losses, evolve=False)
-    comparison = _Comparison(decider.service, recompute, losses)
+    recompute = Recomputation(decider, config, facts, evolve=False)
+    comparison = _Comparison(decider.service, recompute, facts)
     for step in recompute.steps(records):
         if on_step is not None:
             on_step(step)
@@ -83,9 +83,9 @@ def check_service(
 class _Comparison:
     """What the steps of one service gave, beside what was recorded of them."""
 
-    def __init__(self, service: str, recompute: Recomputation, losses: Losses) -> None:
+    def __init__(self, service: str, recompute: Recomputation, facts: RecordingFacts) -> None:
         self._result = ServiceCheck(service=service)
-        self._recompute, self._losses = recompute, losses
+        self._recompute, self._facts = recompute, facts
         self._causes: collections.Counter[str] = collections.Counter()
         self._differences: list[Difference] = []
         self._digest = hashlib.sha256()
@@ -128,7 +128,7 @@ class _Comparison:
     def _count_unrecorded(self, sent: m.OutputMessage, log_us: int) -> None:
         """A message that the step had sent and the log does not hold."""
         early = self._recompute.ledger.precedes(sent.topic, sent.epoch, sent.seq)
-        if early or self._losses.at_edge(log_us):
+        if early or self._facts.at_edge(log_us):
             self._result.at_edges += 1
         elif self._recompute.is_lost(sent.topic):
             self._result.lost += 1
@@ -140,7 +140,7 @@ class _Comparison:
         orphans: collections.Counter[str] = collections.Counter()
         for log_us, (topic, _, _) in self._recompute.ledger.orphans:
             orphans[topic] += 1
-            if self._losses.at_edge(log_us):
+            if self._facts.at_edge(log_us):
                 self._result.at_edges += 1
             elif orphans[topic] <= self._recompute.lost_steps:
                 self._result.lost += 1

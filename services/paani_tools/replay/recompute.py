@@ -35,13 +35,14 @@ class ExpectedGap(StrEnum):
     LOST = "what it needs was lost, as the recorder says"
 
 
-class Losses(NamedTuple):
-    """Messages of each topic that the recorder has counted as lost, and when each recording began and ended [us].
+class RecordingFacts(NamedTuple):
+    """What recordings say of themselves.
 
+    lost: messages of each topic that the recorder has counted as lost. recordings: when each began and ended [us].
     schemas: of the messages of each topic, which tell a field that was not set from one that was not known yet.
     """
 
-    counted: Mapping[str, int]
+    lost: Mapping[str, int]
     recordings: tuple[tuple[int, int], ...]
     schemas: Mapping[str, Schema] = MappingProxyType({})
 
@@ -72,14 +73,14 @@ class Recomputation:
     """`steps` goes through the records once.
 
     evolve: settings are changed, so a recorded state is only taken up at the start and after a break.
-    losses: what the recorder knows of its gaps. instead: as for `Ledger`. lost_steps: steps it has counted as lost.
+    facts: what the recording says of its gaps. instead: as for `Ledger`. lost_steps: steps it has counted as lost.
     """
 
     def __init__(
         self,
         decider: Decider[Any],
         config: Config,
-        losses: Losses,
+        facts: RecordingFacts,
         *,
         evolve: bool,
         instead: Mapping[MessageId, bytes] = NO_PAYLOADS,
@@ -93,8 +94,8 @@ class Recomputation:
         self._reason = SkipReason.BEFORE_STATE
         self._excuse: ExpectedGap | None = ExpectedGap.START
         self._last: m.Step | None = None
-        self._lost = dict(losses.counted)
-        self._losses = losses
+        self._lost = dict(facts.lost)
+        self._facts = facts
         self._last_us = 0
         self.lost_steps = 0
 
@@ -107,7 +108,7 @@ class Recomputation:
             self._last, last_us, self._last_us = step, self._last_us, given.log_us
             missing = 0
             if last is not None:
-                begun = any(last_us < start_us <= given.log_us for start_us, _ in self._losses.recordings)
+                begun = any(last_us < start_us <= given.log_us for start_us, _ in self._facts.recordings)
                 same = step.epoch == last.epoch
                 missing = step.seq - (last.seq + 1 if same else 0)
                 excuse = ExpectedGap.START if begun else None
@@ -133,7 +134,7 @@ class Recomputation:
         return True
 
     def _recompute(self, given: RecordedStep) -> RecomputedStep:
-        step, same, schemas = given.step, None, self._losses.schemas
+        step, same, schemas = given.step, None, self._facts.schemas
         if step.state:
             try:
                 recorded = self._states.decode(step.state)
@@ -148,7 +149,7 @@ class Recomputation:
         if self._state is None:
             return RecomputedStep(given, skip=self._reason, excuse=self._excuse)
         if given.inputs is None:
-            excuse = ExpectedGap.START if given.early or self._losses.at_edge(given.log_us) else None
+            excuse = ExpectedGap.START if given.early or self._facts.at_edge(given.log_us) else None
             if given.absent and excuse is None and all(map(self.is_lost, given.absent)):
                 excuse = ExpectedGap.LOST
             self._lose(SkipReason.AFTER_BREAK, excuse)

@@ -17,7 +17,7 @@ from paani_tools.progress import Progress
 from paani_tools.replay.check import ServiceCheck, StepCallback, check_service
 from paani_tools.replay.difference import Schema
 from paani_tools.replay.ledger import Ledger, MessageId
-from paani_tools.replay.recompute import Losses, RecomputedStep
+from paani_tools.replay.recompute import RecomputedStep, RecordingFacts
 from paani_tools.replay.whatif import ServiceChanges, changes_of
 
 
@@ -65,7 +65,7 @@ class ChangeReport(msgspec.Struct, frozen=True, kw_only=True):
 def check_log(log: Log, config: Config, notes: tuple[str, ...] = ()) -> CheckReport:
     """Compute every service's decisions again. Steps of services that are not installed are named."""
     began_ms = stopwatch_ms()
-    losses = losses_of(log)
+    facts = recording_facts(log)
     chosen = _installed(log)
     with Progress("checking") as progress:
         checks = tuple(
@@ -73,7 +73,7 @@ def check_log(log: Log, config: Config, notes: tuple[str, ...] = ()) -> CheckRep
                 decider,
                 config,
                 log.records(Ledger(decider).topics),
-                losses,
+                facts,
                 _progress_callback(progress, log, decider.service, number, len(chosen)),
             )
             for number, decider in enumerate(chosen)
@@ -95,7 +95,7 @@ def change_log(
 ) -> ChangeReport:
     """Decide everything again with changed settings. Raises UserError for a setting that is wrong."""
     began_ms = stopwatch_ms()
-    changed, losses = with_settings(config, sets), losses_of(log)
+    changed, facts = with_settings(config, sets), recording_facts(log)
     chosen = _installed(log)
     instead: dict[MessageId, bytes] = {}
     with Progress("deciding") as progress:
@@ -105,7 +105,7 @@ def change_log(
                 changed,
                 log.records(Ledger(decider).topics),
                 log.start_us,
-                losses,
+                facts,
                 instead if chained else {},
                 _progress_callback(progress, log, decider.service, number, len(chosen)),
             )
@@ -143,8 +143,8 @@ def services_in(log: Log) -> set[str]:
     return {topic.removesuffix(suffix) for topic in log.topics if topic.endswith(suffix)}
 
 
-def losses_of(log: Log) -> Losses:
-    """What the recorder has counted as dropped or missing, in all parts together, and when it began."""
+def recording_facts(log: Log) -> RecordingFacts:
+    """What the recording says of itself; lost is what was dropped or missing, in all parts together."""
     lost: dict[str, int] = {}
     for counts in log.metadata_by_part("recorder"):
         for topic, text in counts.items():
@@ -152,7 +152,7 @@ def losses_of(log: Log) -> Losses:
                 name, _, number = word.partition("=")
                 if name in {"dropped", "missing"} and number.isdecimal():
                     lost[topic] = lost.get(topic, 0) + int(number)
-    return Losses(lost, log.recordings, {topic: _schema_of(log, topic) for topic in log.topics})
+    return RecordingFacts(lost, log.recordings, {topic: _schema_of(log, topic) for topic in log.topics})
 
 
 def _schema_of(log: Log, topic: str) -> Schema:

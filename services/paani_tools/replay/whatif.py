@@ -17,7 +17,7 @@ from paani_tools.replay.check import StepCallback
 from paani_tools.replay.decision_text import decision_text, reason_text
 from paani_tools.replay.difference import differing_fields
 from paani_tools.replay.ledger import MessageId
-from paani_tools.replay.recompute import Losses, Recomputation
+from paani_tools.replay.recompute import Recomputation, RecordingFacts
 
 GAP_US = 1_000_000  # changed decisions further apart are two episodes
 SHOWN_FIELDS = 6
@@ -53,7 +53,7 @@ def changes_of(
     config: Config,
     records: Iterable[Record],
     start_us: int,
-    losses: Losses,
+    facts: RecordingFacts,
     instead: dict[MessageId, bytes],
     on_step: StepCallback | None = None,
 ) -> ServiceChanges:
@@ -63,7 +63,7 @@ def changes_of(
     instead: inputs given in place of the recorded ones; what is sent and differs is added to it.
     """
     changes = _Changes(decider, start_us)
-    for step in Recomputation(decider, config, losses, evolve=True, instead=instead).steps(records):
+    for step in Recomputation(decider, config, facts, evolve=True, instead=instead).steps(records):
         if on_step is not None:
             on_step(step)
         changes.skipped += step.skip is not None

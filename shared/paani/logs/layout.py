@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import stat
 import struct
 from collections.abc import Container, Iterator
 from pathlib import Path
@@ -14,6 +15,8 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Chunk
 from mcap.stream_reader import get_chunk_data_stream
+
+from paani.errors import UserError
 
 MAGIC = bytes((137, 77, 67, 65, 80, 48, 13, 10))
 PROFILE = "paani"
@@ -60,6 +63,12 @@ def messages_in(data: bytes, wanted: Container[int]) -> Iterator[tuple[int, int,
         if opcode == message and number in wanted and at <= end and length >= MESSAGE.size:
             _, sequence, log_ns, _ = MESSAGE.unpack_from(data, start + _HEAD.size)
             yield number, sequence, log_ns, data[start + _HEAD.size + MESSAGE.size : at]
+
+
+def require_file(path: Path) -> None:
+    """Raises UserError naming a path that is no file: a pipe waits for who writes into it. Raises OSError."""
+    if not stat.S_ISREG(path.stat().st_mode):
+        raise UserError(f"{path}: is no file")
 
 
 def span_bytes(path: Path, span: Span) -> tuple[bytes, str]:

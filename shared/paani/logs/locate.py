@@ -14,7 +14,7 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, ChunkIndex, Footer, Header, Metadata, Schema, Statistics
 
 from paani.errors import UserError
-from paani.logs.layout import DAMAGE, MAGIC, PROFILE, Layout, Span, line_of, messages_in, unpacked_chunk
+from paani.logs.layout import DAMAGE, MAGIC, PROFILE, Layout, Span, line_of, messages_in, require_file, unpacked_chunk
 from paani.logs.scan import HEAD, Damage, ScannedRecord, content, records_in, scan
 
 FOOTER_BYTES = HEAD.size + 20
@@ -25,6 +25,7 @@ _TIMES = struct.Struct("<QQ")
 def layout_of(path: Path) -> Layout:
     """Find out, from the summary where it is whole, else from the data. Raises UserError for what is no MCAP file."""
     try:
+        require_file(path)
         with path.open("rb") as file:
             size = file.seek(0, io.SEEK_END)
             if size == 0:

@@ -36,7 +36,7 @@ from mcap.records import (
 )
 
 from paani.errors import UserError
-from paani.logs.layout import MAGIC, MESSAGE, PROFILE
+from paani.logs.layout import MAGIC, MESSAGE, PROFILE, require_file
 from paani.logs.locate import has_damaged_summary
 from paani.logs.scan import (
     HEAD,
@@ -92,6 +92,7 @@ def repair(path: Path, told_to_stop: Callable[[], bool] = lambda: False) -> Repa
     Raises UserError naming the file for what is no recording of ours or cannot be read or written, InUse, Interrupted.
     """
     try:
+        require_file(path)
         with path.open("rb") as file:
             if not file.seek(0, os.SEEK_END):
                 raise UserError(f"{path}: empty file")

@@ -6,7 +6,7 @@ import pytest
 
 from paani import keys
 from paani.errors import UserError
-from paani_tools.inspect.command import rate_line
+from paani_tools.inspect.command import Arrivals
 from paani_tools.inspect.topic_table import topic_named, topics_markdown, topics_text
 
 
@@ -30,6 +30,21 @@ def test_topics_are_found_by_name_and_mistakes_are_told() -> None:
         topic_named("advisor/advisery")
 
 
-def test_rate_line_states_mean_and_spread() -> None:
-    assert rate_line([0.0, 100.0, 300.0], 5.0) == "6.67 Hz (nominal 5 Hz), gaps 100 to 200 ms, 3 messages"
-    assert rate_line([], 5.0).startswith("0 messages")
+def test_arrivals_state_mean_and_spread() -> None:
+    arrivals = Arrivals()
+    assert arrivals.text(5e3, 5.0) == "0 messages (nominal 5 Hz)"
+    arrivals.add(0.0)
+    assert arrivals.text(100.0, 5.0) == "1 messages (nominal 5 Hz)"
+    for at_ms in (100.0, 300.0):
+        arrivals.add(at_ms)
+    assert arrivals.text(500.0, 5.0) == "6.67 Hz (nominal 5 Hz), gaps 100 to 200 ms, 3 messages"
+
+
+def test_a_topic_that_fell_silent_has_no_rate_of_before() -> None:
+    arrivals = Arrivals()
+    for at_ms in (0.0, 100.0, 200.0):
+        arrivals.add(at_ms)
+    silent = "1.00 Hz (nominal 10 Hz), gaps 100 to 100 ms, 3 messages, silent for 1.8 s"
+    assert arrivals.text(2e3, 10.0) == silent
+    arrivals.add(2e3)
+    assert arrivals.text(2e3, 10.0) == "1.50 Hz (nominal 10 Hz), gaps 100 to 1800 ms, 4 messages"

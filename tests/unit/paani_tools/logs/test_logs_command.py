@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 import re
 from pathlib import Path
 
@@ -144,6 +145,15 @@ def test_bad_input_is_one_line(
     assert not (tmp_path / "t").exists()
 
 
+@pytest.mark.parametrize("what", ["info", "repair", "export"])
+def test_a_pipe_is_no_recording(tmp_path: Path, capsys: pytest.CaptureFixture[str], what: str) -> None:
+    """Opening it would wait for whoever writes into it."""
+    path = tmp_path / ONE
+    os.mkfifo(path)
+    more = ("--csv", tmp_path / "t") if what == "export" else ()
+    assert refused(capsys, what, path, *more) == f"paani: {path}: is no file"
+
+
 def test_a_later_format_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     log = LogWriter(tmp_path / NAME, about(), (), START_US)
     log.finish({})
@@ -195,5 +205,7 @@ def test_two_drives_in_one_folder_last_as_long_as_both(tmp_path: Path, capsys: p
     advised(tmp_path, "20231115T221320Z-1.mcap", START_US + 86_400_000_000)
     both = json.loads(output_of(capsys, "info", tmp_path, "--json"))
     assert (alone["duration_s"], both["duration_s"]) == (60.0, 120.0)
+    rates = [[(t["rate_hz"], t["gap_s"]) for t in info["topics"]] for info in (alone, both)]
+    assert rates == [[(5.0, 0.2), (0.1, 10.0)]] * 2
     assert alone["direction_changes_per_min"] == 6.0
     assert both["direction_changes_per_min"] in {6.0, 6.5}  # with the change from one drive to the other

@@ -18,7 +18,7 @@ from paani.sides import ON_BOARD
 from paani_tools.replay.check import ServiceCheck, check_service
 from paani_tools.replay.difference import as_recorded
 from paani_tools.replay.ledger import Ledger
-from paani_tools.replay.recompute import Losses
+from paani_tools.replay.recompute import RecordingFacts
 from paani_tools.replay.whatif import changes_of
 from tests.unit.paani_tools.replay.recorded_drive import CONFIG, T0_US, TARGET, drive
 
@@ -38,8 +38,8 @@ def check(
     decider = decider_of(service)
     wanted = Ledger(decider).topics
     whole = ((min(r.log_us for r in records), max(r.log_us for r in records)),)
-    losses = Losses(lost or {}, recordings or whole)
-    return check_service(decider, CONFIG, [r for r in records if r.topic in wanted], losses)
+    facts = RecordingFacts(lost or {}, recordings or whole)
+    return check_service(decider, CONFIG, [r for r in records if r.topic in wanted], facts)
 
 
 def changed(records: list[Record], where: Callable[[Record], bool], change: Callable[[Any], Any]) -> list[Record]:
@@ -111,7 +111,7 @@ def test_a_drive_of_two_machines_is_decided_again_by_the_stamps_that_the_steps_w
     navigator = decider_of("navigator")
     topics = Ledger(navigator).topics
     before, after = (
-        check_service(navigator, CONFIG, [r for r in records if r.topic in topics], Losses({}, ()))
+        check_service(navigator, CONFIG, [r for r in records if r.topic in topics], RecordingFacts({}, ()))
         for records in (alone, apart)
     )
     assert after.is_exact, after.differences[:3]
@@ -271,7 +271,7 @@ def test_other_settings_change_decisions_in_episodes_with_their_reasons() -> Non
     wanted = Ledger(decider).topics
     records = [r for r in DRIVE if r.topic in wanted]
     settings = with_settings(CONFIG, ("advisor.policy.center_block_risk=0.35",))
-    result = changes_of(decider, settings, records, T0_US, Losses({}, ()), {})
+    result = changes_of(decider, settings, records, T0_US, RecordingFacts({}, ()), {})
     assert 0 < result.changed < result.messages
     assert result.numbers > 0
     assert "center_block_risk" in dict(result.fields)
@@ -282,7 +282,7 @@ def test_other_settings_change_decisions_in_episodes_with_their_reasons() -> Non
     assert "(limit 0.35)" in first.computed_why
     assert sum(e.decisions for e in result.episodes) == result.changed
     assert all(0 <= e.start_s <= e.end_s <= 33 for e in result.episodes)
-    same = changes_of(decider, CONFIG, records, T0_US, Losses({}, ()), {})
+    same = changes_of(decider, CONFIG, records, T0_US, RecordingFacts({}, ()), {})
     assert (same.changed, same.numbers, same.episodes) == (0, 0, ())
 
 
@@ -290,12 +290,11 @@ def test_changed_advice_reaches_the_services_after_it() -> None:
     settings = with_settings(CONFIG, ("advisor.policy.center_block_risk=0.35",))
     advisor, navigator = decider_of("advisor"), decider_of("navigator")
     instead: dict[tuple[str, int, int], bytes] = {}
-    changes_of(
-        advisor, settings, [r for r in DRIVE if r.topic in Ledger(advisor).topics], T0_US, Losses({}, ()), instead
-    )
+    facts = RecordingFacts({}, ())
+    changes_of(advisor, settings, [r for r in DRIVE if r.topic in Ledger(advisor).topics], T0_US, facts, instead)
     records = [r for r in DRIVE if r.topic in Ledger(navigator).topics]
-    assert changes_of(navigator, settings, records, T0_US, Losses({}, ()), {}).changed == 0
-    assert changes_of(navigator, settings, records, T0_US, Losses({}, ()), instead).changed > 0
+    assert changes_of(navigator, settings, records, T0_US, RecordingFacts({}, ()), {}).changed == 0
+    assert changes_of(navigator, settings, records, T0_US, RecordingFacts({}, ()), instead).changed > 0
 
 
 def test_memory_is_bounded() -> None:

@@ -12,7 +12,7 @@ from paani import messages as m
 from paani.decider import decider_of
 from paani_tools.replay.check import check_service
 from paani_tools.replay.ledger import Ledger
-from paani_tools.replay.recompute import Losses
+from paani_tools.replay.recompute import RecordingFacts
 from paani_tools.replay.shift import TimeShift
 from tests.unit.paani_tools.replay.recorded_drive import CONFIG, T0_US, drive
 
@@ -58,7 +58,7 @@ def test_a_moved_drive_is_still_exact(service: str) -> None:
     moved = [record._replace(data=LATER.shift_message(record.data)) for record in drive(14.0)]
     decider = decider_of(service)
     records = [r for r in moved if r.topic in Ledger(decider).topics]
-    result = check_service(decider, CONFIG, records, Losses({}, ()))
+    result = check_service(decider, CONFIG, records, RecordingFacts({}, ()))
     assert result.is_exact, (result.unexplained, result.differences)
     assert result.states > 5
 

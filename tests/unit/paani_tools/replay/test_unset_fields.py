@@ -15,7 +15,7 @@ from paani.logs.schema import json_schema
 from paani_tools.replay.check import ServiceCheck, check_service
 from paani_tools.replay.difference import as_recorded
 from paani_tools.replay.ledger import Ledger
-from paani_tools.replay.verify import losses_of
+from paani_tools.replay.verify import recording_facts
 from tests.unit.paani_tools.replay.recorded_drive import CONFIG, drive, write_log
 
 pytestmark = pytest.mark.slow
@@ -33,7 +33,7 @@ def without_limit(record: Record) -> Record:
 
 def check_advisor(path: Path) -> ServiceCheck:
     log, decider = open_log(path), decider_of("advisor")
-    return check_service(decider, CONFIG, log.records(Ledger(decider).topics), losses_of(log))
+    return check_service(decider, CONFIG, log.records(Ledger(decider).topics), recording_facts(log))
 
 
 @pytest.mark.parametrize("chunked", [True, False])
