@@ -107,6 +107,8 @@ def _print_and_record(net: str, figures: list[Figure], arguments: argparse.Names
         catalogue = load_catalogue(arguments.weights)
         if net not in catalogue:
             raise UserError(f"{arguments.weights}: no model named {net!r}")
+        if not figures:
+            raise UserError(f"--record: nothing was measured of {net}, and its figures stay as they are")
         model = msgspec.structs.replace(catalogue[net], figures=tuple(figures))
         save_catalogue({**catalogue, net: model}, arguments.weights)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -94,18 +95,29 @@ def read_yolo(path: Path, kinds: int) -> tuple[Box, ...]:
     Raises UserError naming file and line of a row that is malformed or not finite, of an unknown class, and of a box
     without area or outside the picture. Boxes end inside it.
     """
+    return tuple(_parse_row(numbers, place, kinds) for place, numbers in read_label_rows(path))
+
+
+def read_label_rows(path: Path) -> Iterator[tuple[str, list[float]]]:
+    """Where each row of a label file stands, and its numbers.
+
+    Raises UserError naming a file that cannot be read as text, or the line of what is no number.
+    """
     try:
         text = path.read_text(encoding="ascii")
     except (OSError, UnicodeDecodeError) as error:
         raise UserError(f"{path}: {error}") from error
-    return tuple(
-        _parse_row(line, f"{path}:{number}", kinds) for number, line in enumerate(text.splitlines(), 1) if line.strip()
-    )
+    for number, line in enumerate(text.splitlines(), 1):
+        if fields := line.split():
+            try:
+                yield f"{path}:{number}", [float(field) for field in fields]
+            except ValueError as error:
+                raise UserError(f"{path}:{number}: {error}") from error
 
 
-def _parse_row(line: str, place: str, kinds: int) -> Box:
+def _parse_row(numbers: list[float], place: str, kinds: int) -> Box:
     try:
-        kind, cx, cy, width, height = (float(field) for field in line.split())
+        kind, cx, cy, width, height = numbers
     except ValueError as error:
         raise UserError(f"{place}: {error}") from error
     if not np.isfinite((kind, cx, cy, width, height)).all():

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from paani.errors import UserError
 from paani.undecodable import UNREADABLE
+from paani_models.datasets.checked_files import read_label_rows
 
 IGNORE = 255
 SEGMENTER_CLASSES = ("water", "obstacle", "sky")  # D6
@@ -310,18 +311,16 @@ def read_boxes(label: Path) -> NDArray[np.float32]:
     Raises UserError where a row is malformed, a class unknown, or a box empty (R8).
     """
     rows = []
-    for number, line in enumerate(label.read_text().splitlines(), 1):
-        if not line.strip():
-            continue
+    for place, numbers in read_label_rows(label):
         try:
-            kind, cx, cy, width, height = (float(field) for field in line.split()[:5])
+            kind, cx, cy, width, height = numbers[:5]
         except ValueError as error:
-            raise UserError(f"{label}:{number}: {error}") from error
+            raise UserError(f"{place}: {error}") from error
         x1, y1 = max(0.0, cx - width / 2), max(0.0, cy - height / 2)
         x2, y2 = min(1.0, cx + width / 2), min(1.0, cy + height / 2)
         known = kind in range(len(DETECTOR_CLASSES)) and np.isfinite((cx, cy, width, height)).all()
         if not known or not (x1 < x2 and y1 < y2):
-            raise UserError(f"{label}:{number}: not a class id and a box inside the picture")
+            raise UserError(f"{place}: not a class id and a box inside the picture")
         rows.append((kind, x1, y1, x2, y2))
     return np.array(rows, np.float32).reshape(-1, 5)
 

@@ -21,14 +21,18 @@ NULL_PICTURES = 200
 def measure_segmenter(net: Path, samples: list[Sample], workers: Workers | None = None) -> list[Figure]:
     """IoU per class, their mean, and edge F1 per source, at the mask's own size; and the share of water in nothing.
 
-    A source whose people marked only water is scored on water against the rest.
+    A class that is nowhere is left out. A source whose people marked only water is scored on water against the rest.
     """
     scored = score_masks(net, samples, workers)
     figures = []
     for source in dict.fromkeys(item.sample.source for item in scored):
         chosen = [item for item in scored if item.sample.source == source]
-        for metric, measure in mask_measures(source).items():
-            figures.append(Figure(metric, source.name, round(measure(sum_counts(chosen)), 4), len(chosen)))
+        measured = {metric: measure(sum_counts(chosen)) for metric, measure in mask_measures(source).items()}
+        figures += [
+            Figure(metric, source.name, round(value, 4), len(chosen))
+            for metric, value in measured.items()
+            if np.isfinite(value)  # a class may be nowhere
+        ]
     return [*figures, measure_null_pictures(net)]
 
 

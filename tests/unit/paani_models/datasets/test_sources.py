@@ -49,6 +49,13 @@ def test_bad_boxes_are_refused_with_their_line_r8(tmp_path: Path, text: str) -> 
         read_boxes(label)
 
 
+def test_boxes_in_bytes_that_are_no_text_are_refused(tmp_path: Path) -> None:
+    label = tmp_path / "a.txt"
+    label.write_bytes(b"1 .5 .5 .1 .1\n# Bo\xefte\n")
+    with pytest.raises(UserError, match=r"a\.txt"):
+        read_boxes(label)
+
+
 @pytest.mark.parametrize("held_out", ["seq0", "seq1", "seq2"])
 def test_whole_sequences_are_held_out(tmp_path: Path, held_out: str) -> None:
     write_source(tmp_path / "river", {f"f{i}": f"seq{i % 3}" for i in range(9)})

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import re
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
+import cv2
 import msgspec
 import numpy as np
 import pytest
 
 from paani.errors import UserError
 from paani.statistics.charts import bar, lines
+from paani_models.catalogue import WEIGHTS
 from paani_models.commands.models import main
 from paani_models.datasets.sources import Sample, Source, choose_sources
 from paani_models.detector.metrics import Detections
@@ -28,6 +31,7 @@ from paani_models.report.estimates import (
 )
 from paani_models.report.evidence import Evidence, Finding, Findings
 from paani_models.report.experiments import read_experiments
+from paani_models.report.manifest_figures import measure_segmenter
 from paani_models.report.page import PageContent, page
 from paani_models.report.records import (
     FaultCell,
@@ -253,3 +257,23 @@ def test_evaluate_writes_the_same_json_twice(data: Path, tmp_path: Path) -> None
 def test_an_unknown_net_is_named(data: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["evaluate", "nonsense", "--data", str(data), "--sources", "tbiseg_dasha"]) == 2
     assert "no segmenter or detector named 'nonsense'" in capsys.readouterr().err
+
+
+def test_nothing_measured_records_nothing(data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    weights = Path(shutil.copytree(WEIGHTS, tmp_path / "weights"))
+    pictures = ["--weights", str(weights), "--data", str(data), "--sources", "tbiseg_dasha,mcoe_boats"]
+    faults, manifest = tmp_path / "faults.json", (weights / "manifest.json").read_bytes()
+    faults.write_bytes(msgspec.json.encode(FaultReport(cells=())))
+    assert main(["evaluate", "--faults", str(faults), "--record", *pictures]) == 2
+    assert "nothing was measured of gate" in capsys.readouterr().err
+    assert (weights / "manifest.json").read_bytes() == manifest
+
+
+def test_a_class_that_is_nowhere_has_no_figure(tmp_path: Path) -> None:
+    water = np.random.default_rng(1).normal((90, 80, 60), 6.0, (240, 320, 3)).clip(0, 255).astype(np.uint8)
+    picture, truth = tmp_path / "a.png", tmp_path / "mask.png"
+    assert cv2.imwrite(str(picture), water)
+    assert cv2.imwrite(str(truth), np.ones((240, 320), np.uint8))
+    shown = replace(sample("a"), picture=picture, mask=truth)
+    figures = measure_segmenter(WEIGHTS / "segmenter.onnx", [shown])
+    assert [f.metric for f in figures] == ["iou_water", "iou_obstacle", "miou", "edge_f1", "max_water_frac"]
