@@ -90,10 +90,10 @@ def find_echoes(scan: Scan) -> tuple[F64, F64]:
 
 @functools.lru_cache(maxsize=MAX_SCANS)
 def match_segments(before: Scan, after: Scan) -> dict[int, int]:
-    """For segments of one scan, by number, the one of the scan before whose echoes lie nearest to theirs.
+    """For segments of one scan, by number, the one of the scan before to which all their echoes together lie nearest.
 
     None is further away than `GATE_M` and what the fastest vessel makes meanwhile. Two may go on from one: a hull whose
-    side breaks off at another place in every scan.
+    side breaks off at another place in every scan. A piece that broke off is near to a few echoes of the hull alone.
     """
     runs, later_runs = find_segments(before), find_segments(after)
     if not runs or not later_runs:
@@ -103,9 +103,13 @@ def match_segments(before: Scan, after: Scan) -> dict[int, int]:
     off_east_m, off_north_m = later_east_m[:, None] - east_m, later_north_m[:, None] - north_m
     square_m2 = off_east_m * off_east_m + off_north_m * off_north_m
     first, later_first = ([0, *np.cumsum([run.size for run in each])[:-1]] for each in (runs, later_runs))
-    nearest_m2 = np.minimum.reduceat(np.minimum.reduceat(square_m2, later_first, axis=0), first, axis=1)
+    nearest_m2 = np.minimum.reduceat(square_m2, first, axis=1)  # of each echo to each segment before
     gate_m = GATE_M + GATE_MPS * (after.stamp_us - before.stamp_us) * 1e-6
-    return {number: int(row_m2.argmin()) for number, row_m2 in enumerate(nearest_m2) if row_m2.min() <= gate_m * gate_m}
+    is_far = np.minimum.reduceat(nearest_m2, later_first, axis=0) > gate_m * gate_m
+    # In whole millimetres, as the sum of whole numbers does not depend on their order.
+    together_mm = np.add.reduceat(np.rint(1e3 * np.sqrt(nearest_m2)).astype(np.int64), later_first, axis=0)
+    together_mm[is_far] = np.iinfo(np.int64).max
+    return {number: int(row_mm.argmin()) for number, row_mm in enumerate(together_mm) if not is_far[number].all()}
 
 
 @functools.lru_cache(maxsize=MAX_SCANS)
