@@ -274,6 +274,6 @@ def test_a_class_that_is_nowhere_has_no_figure(tmp_path: Path) -> None:
     picture, truth = tmp_path / "a.png", tmp_path / "mask.png"
     assert cv2.imwrite(str(picture), water)
     assert cv2.imwrite(str(truth), np.ones((240, 320), np.uint8))
-    shown = replace(sample("a"), picture=picture, mask=truth)
-    figures = measure_segmenter(WEIGHTS / "segmenter.onnx", [shown])
+    on_water = replace(sample("a"), picture=picture, mask=truth)
+    figures = measure_segmenter(WEIGHTS / "segmenter.onnx", [on_water])
     assert [f.metric for f in figures] == ["iou_water", "iou_obstacle", "miou", "edge_f1", "max_water_frac"]
