@@ -111,15 +111,15 @@ CASES: list[tuple[dict[str, m.Message | None], tuple[str, ...], list[str]]] = [
     (still(NOT_ENABLED, m.Inhibit.HOLDING, leg="hold station"), (), ["HOLDING", "HOLDING", "hold station"]),
     (still(NOT_ENABLED, m.Inhibit.ROUTE_FINISHED), (), ["DONE", "MISSION DONE", "route finished"]),
     (still(NOT_ENABLED, m.Inhibit.HOLDING, m.Inhibit.OUTSIDE_FENCE), (),
-     ["STANDING", "STANDING STILL", "outside the fence or on land, or too close to its edge"]),
+     ["NO_THRUST", "NO THRUST", "outside the fence or on land, or too close to its edge"]),
     (still(NOT_ENABLED, m.Inhibit.ADVISED_STOP) | {"advisor/advisory": STOP_ADVISED}, (),
-     ["STANDING", "STANDING STILL", "the advisor advises STOP: no safe side"]),
+     ["NO_THRUST", "NO THRUST", "the advisor advises STOP: no safe side"]),
     # Thrust that works against the drift alone is no way on.
     ({"navigator/command": replace(ORDER, speed_mps=0.0, direction=m.Direction.STOP, keeps_station=True,
       vetoes=(m.Inhibit.ADVISED_STOP,)), "advisor/advisory": STOP_ADVISED}, (),
      ["KEEPING_STATION", "KEEPING STATION", "the advisor advises STOP: no safe side"]),
     # Advice that has changed since the order is not said to be why.
-    (still(NOT_ENABLED, m.Inhibit.ADVISED_STOP), (), ["STANDING", "STANDING STILL", "the advisor advises STOP"]),
+    (still(NOT_ENABLED, m.Inhibit.ADVISED_STOP), (), ["NO_THRUST", "NO THRUST", "the advisor advises STOP"]),
     (still(NOT_ARMED, m.Inhibit.NOT_ARMED), (), ["NOT_ARMED", "NOT ARMED", "nothing else keeps the boat still"]),
     (still(NOT_ARMED, m.Inhibit.NOT_ARMED, m.Inhibit.NO_ROUTE), (), ["NOT_ARMED", "NOT ARMED", "no route"]),
     # A STOP comes before all else: standing, nothing that looks like driving is said.
@@ -139,9 +139,9 @@ CASES: list[tuple[dict[str, m.Message | None], tuple[str, ...], list[str]]] = [
     (still(NOT_ENABLED, m.Inhibit.IDLE, leg="idle"), (), ["IDLE", "IDLE", "nothing else keeps the boat still"]),
     (still(NOT_ENABLED, m.Inhibit.IDLE, m.Inhibit.STALE_ODOMETRY), (), ["IDLE", "IDLE", "position too old"]),
     ({}, ("plant/thrust_applied",), ["UNKNOWN", "UNKNOWN", "no recent report of thrust"]),
-    (still(m.ZeroCause.PULSE_LOST), ("camera/picture",), ["STANDING", "STANDING STILL", "no recent picture"]),
+    (still(m.ZeroCause.PULSE_LOST), ("camera/picture",), ["NO_THRUST", "NO THRUST", "no recent picture"]),
     (still(m.ZeroCause.ARMING_LOST) | SILENT_OPERATOR, (),
-     ["STANDING", "STANDING STILL", "no word from the operator's process"]),
+     ["NO_THRUST", "NO THRUST", "no word from the operator's process"]),
 ]  # fmt: skip
 
 

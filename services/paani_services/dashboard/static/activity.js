@@ -33,7 +33,7 @@ export function describeActivity(store, now) {
   const isOnPurpose = inMission && inhibits.every((reason) => reason === inMission || reason.code === "not_enabled");
   if (isOnPurpose && inMission.code === "HOLDING") return activity("HOLDING", command?.leg || inMission.text);
   if (isOnPurpose && inMission.code !== "NO_ROUTE") return activity("DONE", inMission.text);
-  return activity("STANDING", (inhibits.find((reason) => reason.stage !== "mission" || reason.code === "NO_ROUTE") ?? inhibits[0]).text);
+  return activity("NO_THRUST", (inhibits.find((reason) => reason.stage !== "mission" || reason.code === "NO_ROUTE") ?? inhibits[0]).text);
 }
 
 /** What else keeps the boat still. @param {import("./inhibits.js").StopReason[]} inhibits */

@@ -223,7 +223,7 @@ export const STOP_REASONS = {
 export const ACTIVITIES = {
   STOPPED: ["STOPPED", "stop"],
   NOT_ARMED: ["NOT ARMED", "none"],
-  STANDING: ["STANDING STILL", "stop"], KEEPING_STATION: ["KEEPING STATION", "stop"],
+  NO_THRUST: ["NO THRUST", "stop"], KEEPING_STATION: ["KEEPING STATION", "stop"],
   HOLDING: ["HOLDING", "go"],
   DONE: ["MISSION DONE", "none"],
   WAITING: ["WAITING", "turn"],
