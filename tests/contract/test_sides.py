@@ -176,3 +176,11 @@ def test_who_echoes_for_its_side_has_a_pulse_and_is_on_no_other(graph: Graph) ->
         assert not is_sent_from(side.other, keys.pulse(ECHOES[side]), graph)
         assert keys.pulse(ECHOES[side]).name in {topic.name for topic in topics_sent(side, graph)}
     assert not any(is_sent_from(side, keys.health(ROUTER), graph) for side in SIDES)
+
+
+@pytest.mark.parametrize("graph", Graph)
+@pytest.mark.parametrize("side", SIDES)
+def test_l4_on_either_machine_the_truth_reaches_nobody_that_decides(side: Side, graph: Graph, runtime: str) -> None:
+    reaching = rights(config_on(side, graph, runtime).bus, "egress", "put")
+    readers = {user for user, names in reaching.items() if any(name.startswith("@truth") for name in names)}
+    assert readers <= {"eye", "dashboard", "recorder", authority.OBSERVER}

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
+import statistics
 from pathlib import Path
 
 import cv2
@@ -163,3 +165,42 @@ def evidence_at(now_us: int) -> m.Evidence:
         source_us=now_us, frame_seq=0, frame_epoch=1, width_px=320, height_px=240, usable=True,
         left=CLEAR, center=CLEAR, right=CLEAR, segmentation=m.SegmentationSource.LEARNED, navigation_eligible=True,
     )  # fmt: skip
+
+
+async def test_j17_advice_is_repeated_five_times_a_second(spawn: Spawn, open_as: OpenAs) -> None:
+    """Of nothing, too."""
+    advisory, sent_us = (await open_as("observer")).latest(keys.ADVISORY), []
+    async with spawn("advisor"), asyncio.timeout(20):
+        for _ in range(9):
+            sent_us.append((await advisory.next()).sent_us)
+    gaps_us = [after - before for before, after in itertools.pairwise(sent_us)]
+    assert statistics.median(gaps_us) == pytest.approx(200_000, rel=0.1)
+
+
+async def test_j16_j17_perception_takes_pictures_at_its_own_rate_and_none_that_is_old(
+    spawn: Spawn, open_as: OpenAs
+) -> None:
+    camera, observer, clock = await open_as("camera"), await open_as("observer"), WallClock()
+    pictures, evidence = camera.picture_publisher(keys.PICTURE), observer.queue(keys.EVIDENCE, 64)
+    data, numbers = cv2.imencode(".jpg", river())[1].tobytes(), itertools.count()
+
+    def put(age_us: int) -> None:
+        taken_us = clock.now_us() - age_us
+        header = m.PictureHeader(
+            source_us=taken_us, frame_seq=next(numbers), frame_epoch=5, width_px=320, height_px=240
+        )
+        pictures.put_picture(header, data)
+
+    async with spawn("perception", "perception.rate_hz=2"):
+        async with asyncio.timeout(20):
+            while not evidence.drain():
+                put(0)
+                await asyncio.sleep(0.1)
+        for _ in range(30):
+            put(0)
+            await asyncio.sleep(0.1)
+        assert 5 <= len(evidence.drain()) <= 7
+        put(900_000)
+        async with asyncio.timeout(10):
+            while (await evidence.get()).cause is not m.UnusableCause.STALE:
+                pass

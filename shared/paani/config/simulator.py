@@ -35,6 +35,7 @@ class SensorsConfig(Section, frozen=True):
     gyro_bias_std_radps: NonNegative = 0.002  # constant over a drive, drawn at its start
     accel_noise_mps2: NonNegative = 0.03  # of one sample
     compass_noise_rad: NonNegative = 0.01  # of one sample
+    tilt_noise_rad: NonNegative = 0.001  # of one sample of roll or pitch, which a unit levels over seconds
     compass_bias_std_rad: NonNegative = 0.02  # constant over a drive, drawn at its start
     ais: bool = True  # whether the boat has a receiver
     lidar: bool = False  # whether it has a range scanner, which costs as much as the board

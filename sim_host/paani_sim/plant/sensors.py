@@ -102,7 +102,10 @@ def measure_gps(
 
 
 def measure_imu(errors: SensorErrors, truth: Truth, config: SensorsConfig, rng: np.random.Generator) -> ImuReading:
-    """One sample: rates with bias and noise, specific force with noise, attitude with compass bias."""
+    """One sample: rates with bias and noise, specific force with noise, attitude with noise and compass bias.
+
+    Roll and pitch come from gravity: what disturbs the force along an axis of the hull tilts the boat about the other.
+    """
     draw = rng.standard_normal(7).tolist()
     gyro, accel = config.gyro_noise_radps, config.accel_noise_mps2
     rates, force, bias = truth.rates_radps, truth.specific_force_mps2, errors.gyro_radps
@@ -117,7 +120,7 @@ def measure_imu(errors: SensorErrors, truth: Truth, config: SensorsConfig, rng: 
             force[1] + accel * draw[4],
             force[2] + accel * draw[5],
         ),
-        roll_rad=truth.roll_rad,
-        pitch_rad=truth.pitch_rad,
+        roll_rad=truth.roll_rad + config.tilt_noise_rad * draw[4],
+        pitch_rad=truth.pitch_rad + config.tilt_noise_rad * draw[3],
         yaw_rad=wrap_rad(truth.yaw_rad + errors.compass_rad + config.compass_noise_rad * draw[6]),
     )

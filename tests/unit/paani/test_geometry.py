@@ -34,5 +34,9 @@ def test_the_plane_agrees_with_pymap3d(latitude: float, longitude: float, x_m: f
     assert enu_from_geodetic(lat, lon, latitude, longitude) == pytest.approx((x_m, y_m), abs=1e-6)
 
 
+def test_l2_east_goes_on_across_the_date_line() -> None:
+    assert enu_from_geodetic(0.0, -179.999, 0.0, 179.999) == pytest.approx((222.64, 0.0), abs=0.1)
+
+
 def test_clip() -> None:
     assert [clip(v, -1.0, 1.0) for v in (-2.0, 0.5, 3.0)] == [-1.0, 0.5, 1.0]

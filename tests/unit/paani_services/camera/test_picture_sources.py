@@ -14,7 +14,7 @@ from paani.clock import patience_us
 from paani.config import CameraConfig, load_config
 from paani.errors import UserError
 from paani.messages import TimeBase
-from paani_services.camera.own_pictures import encode_jpeg
+from paani_services.camera.own_pictures import _make_header, encode_jpeg
 from paani_services.camera.picture_sources import Webcam, parse_webcam_index, play_frames, shrink_to_fit
 from tests.pictures import river
 
@@ -157,3 +157,12 @@ def test_webcam_sources_are_parsed() -> None:
 def test_the_rate_limit_tolerates_jitter_alone_a8(rate_hz: float, patience_s: float) -> None:
     """A8, J17: one picture every two seconds is every two seconds; the tolerance is for jitter alone."""
     assert patience_us(rate_hz) == pytest.approx(patience_s * 1e6)
+
+
+def test_i17_the_index_over_the_rate_is_the_time_of_a_picture_and_the_header_says_so(folder: Path) -> None:
+    frames = list(play_frames(folder, CameraConfig(rate_hz=4.0, loop=False)))
+    assert [frame.media_us for frame in frames] == [0, 250_000, 500_000]
+    headers = [_make_header(frame.bgr, 9, frame) for frame in frames if frame.bgr is not None]
+    assert [(each.time_base, each.media_us) for each in headers] == [
+        (TimeBase.FRAME_INDEX, frame.media_us) for frame in frames
+    ]

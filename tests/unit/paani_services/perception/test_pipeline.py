@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 from paani import messages as m
+from paani.arrays import U8
 from paani.clock import stopwatch_ms
 from paani.config import PerceptionConfig, load_config
 from paani.config.perception import WeightSet
@@ -315,3 +316,10 @@ def test_refused_pictures_leave_at_most_one_run_under_way(monkeypatch: pytest.Mo
     assert len(begun) == 20, "what is too old costs nothing more"
     assert eyes.perceive(river(), msgspec.structs.replace(HEADER, frame_epoch=99), 0.0)[0].usable
     eyes.close()
+
+
+@pytest.mark.parametrize("picture", [river(), PICTURES["black"]], ids=["river", "black"])
+def test_i17_evidence_has_its_pictures_own_time(picture: U8) -> None:
+    header = msgspec.structs.replace(HEADER, media_us=1_234, time_base=m.TimeBase.MEDIA)
+    found, _ = perceiver().perceive(picture, header, 0.0)
+    assert (found.source_us, found.media_us, found.time_base) == (HEADER.source_us, 1_234, m.TimeBase.MEDIA)

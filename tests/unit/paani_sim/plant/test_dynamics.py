@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from paani_sim.plant.dynamics import Fans, HullState, attitude, body_velocity, compute_wrench
 from paani_sim.vessels import load_vessel
+from paani_sim.water.surroundings import Surroundings
 from paani_sim.water.waves import GRAVITY_MPS2
 
 PAPER = load_vessel("paper")
@@ -87,3 +88,15 @@ def test_attitude_inverts_the_quaternion(pitch: float, yaw: float) -> None:
     )
     angles = attitude(cy * cp, -sy * sp, cy * sp, sy * cp)
     assert angles == pytest.approx((0.0, pitch, yaw), abs=1e-9)
+
+
+def test_k8_wind_and_waves_do_nothing_to_the_papers_hull() -> None:
+    moving = AFLOAT._replace(vx_mps=0.3, vy_mps=0.1, yaw_rate_radps=0.2)
+    blown = Surroundings(wind_x_mps=6.0, wind_y_mps=-4.0, envelope_x_m2=0.02, envelope_y_m2=0.01)
+    assert compute_wrench(moving, Fans(1.0, 2.0), PAPER, blown) == compute_wrench(moving, Fans(1.0, 2.0), PAPER)
+
+
+@pytest.mark.parametrize("axis", [0, 1], ids=["roll", "pitch"])
+@pytest.mark.parametrize("angle_rad", [0.1, -0.3])
+def test_k7_the_stiffness_is_the_same_at_every_angle(axis: int, angle_rad: float) -> None:
+    assert compute_wrench(turned(angle_rad, axis), IDLE, PAPER)[3 + axis] == pytest.approx(-90.0 * angle_rad)

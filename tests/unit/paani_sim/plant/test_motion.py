@@ -169,3 +169,12 @@ def test_vessel_of_the_settings_goes_before_the_scenario_s(open_plant: OpenPlant
             assert not plant.read_gps().fix
         finally:
             plant.close()
+
+
+@pytest.mark.parametrize("yaw_rad", [0.0, 1.0])
+def test_k4_k8_the_boat_weighs_12_4_kg_to_whatever_side_it_is_pushed(open_plant: OpenPlant, yaw_rad: float) -> None:
+    """2 N from rest, for one step: nothing is added to its mass."""
+    plant = open_plant()
+    plant.place(0.0, 0.0, yaw_rad)
+    plant.step(1.0, 1.0)
+    assert plant.velocity[0] == pytest.approx(2.0 / 12.4 * STEP_S, rel=0.01)

@@ -6,9 +6,12 @@ import statistics
 import numpy as np
 import pytest
 
-from paani.config import SensorsConfig
+from paani.config import PlantConfig, SensorsConfig
 from paani.geometry import enu_from_geodetic
+from paani_sim.plant.plant import Plant
 from paani_sim.plant.sensors import Truth, initial_errors, measure_gps, measure_imu
+from paani_sim.plant.telemetry import gps_message, imu_message
+from paani_sim.worlds import load_world
 
 CONFIG = SensorsConfig()
 ORIGIN_DEG = (47.65, 9.48)
@@ -61,6 +64,46 @@ def test_imu_bias_is_constant_and_noise_is_not() -> None:
     assert statistics.pstdev(rate) == pytest.approx(CONFIG.gyro_noise_radps, rel=0.1)
     yaw = statistics.fmean(sample.yaw_rad for sample in samples)
     assert yaw - 1.5 == pytest.approx(errors.compass_rad, abs=1e-3)
+
+
+def test_k9_every_value_has_an_error_of_its_own() -> None:
+    rng = np.random.default_rng(5)
+    errors = initial_errors(CONFIG, rng)
+    fixes, samples = [], []
+    for _ in range(400):
+        errors, fix = measure_gps(errors, TRUTH, ORIGIN_DEG, CONFIG, rng)
+        east_m, north_m = enu_from_geodetic(fix.latitude_deg, fix.longitude_deg, *ORIGIN_DEG)
+        velocity = (fix.sog_mps * math.cos(fix.cog_rad), fix.sog_mps * math.sin(fix.cog_rad))
+        fixes.append((east_m - errors.gps_x_m, north_m - errors.gps_y_m, *velocity))
+        imu = measure_imu(errors, TRUTH, CONFIG, rng)
+        angles = (imu.roll_rad, imu.pitch_rad, imu.yaw_rad - errors.compass_rad)
+        samples.append((*imu.rates_radps, *imu.specific_force_mps2, *angles))
+    of_fix = [CONFIG.gps_white_std_m] * 2 + [CONFIG.gps_speed_std_mps] * 2
+    of_sample = [CONFIG.gyro_noise_radps] * 3 + [CONFIG.accel_noise_mps2] * 3
+    of_sample += [CONFIG.tilt_noise_rad] * 2 + [CONFIG.compass_noise_rad]
+    for values, std in zip([*zip(*fixes, strict=True), *zip(*samples, strict=True)], of_fix + of_sample, strict=True):
+        assert statistics.pstdev(values) == pytest.approx(std, rel=0.15)
+    for values, rate, bias in zip(zip(*samples, strict=True), TRUTH.rates_radps, errors.gyro_radps, strict=False):
+        assert statistics.fmean(values) - rate == pytest.approx(bias, abs=0.2 * CONFIG.gyro_noise_radps)
+    assert all(abs(bias) > 0.0 for bias in (*errors.gyro_radps, errors.compass_rad))
+
+
+def test_k9_what_is_sent_is_no_truth() -> None:
+    world = load_world("lake")
+    plant = Plant(world, PlantConfig(), 1)
+    try:
+        plant.place(3.0, 4.0, 0.5)
+        origin_deg = (world.origin_lat_deg, world.origin_lon_deg)
+        for _ in range(3):
+            fix = gps_message(plant, 1)
+            east_m, north_m = enu_from_geodetic(fix.latitude_deg, fix.longitude_deg, *origin_deg)
+            assert min(abs(east_m - 3.0), abs(north_m - 4.0)) > 1e-3
+        imu, truth = imu_message(plant, 1), plant.attitude
+        assert imu.yaw_rad != pytest.approx(truth.yaw_rad, abs=1e-6)
+        assert imu.roll_rad != pytest.approx(truth.roll_rad, abs=1e-6)
+        assert imu.gyro_z_radps != 0.0
+    finally:
+        plant.close()
 
 
 def test_seed_decides_everything() -> None:
