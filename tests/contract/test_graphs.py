@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import pytest
+import zenoh
 
 from paani import authority, keys
 from paani.config import BusConfig, Config, load_config
@@ -171,3 +172,12 @@ def test_a_profile_of_a_later_layer_wins(tmp_path: Any) -> None:
     file.write_text('profile = "paani"\n[advisor]\nrate_hz = 4.0\n')
     config = load_config(file=file, sets=["profile=hull"])
     assert (config.profile, config.bus.graph, config.advisor.rate_hz) == ("hull", Graph.HULL, 4.0)
+
+
+@pytest.mark.parametrize("graph", GRAPHS)
+def test_b13_no_rule_but_the_controllers_reaches_thrust(graph: Graph) -> None:
+    thrust = zenoh.KeyExpr(keys.THRUST.name)
+    writers = {
+        user for user, names in written(graph).items() if any(zenoh.KeyExpr(name).intersects(thrust) for name in names)
+    }
+    assert writers == {"controller"}

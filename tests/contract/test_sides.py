@@ -77,6 +77,7 @@ def test_stop_may_be_asked_for_on_either_machine_and_arming_only_where_the_opera
 
 def test_the_papers_split_and_a_hulls() -> None:
     """Seeing and judging on the board; of a hull all control too, and the operator where the person is."""
+    assert services_on(Side.BOARD, Graph.HIL) == services_on(Side.BOARD, Graph.SIMULATION)
     assert services_on(Side.BOARD, Graph.SIMULATION) == (
         "router",
         "camera",

@@ -290,3 +290,28 @@ def test_a_copy_of_the_shipped_model_scores_as_shipped(tmp_path: Path) -> None:
     shipped = Perceiver(PerceptionConfig(), stopwatch_ms)
     one, other = (eyes.perceive(river(), HEADER, 0.0)[0] for eyes in (own, shipped))
     assert (one.left, one.center, one.right) == (other.left, other.center, other.right)
+
+
+@pytest.mark.parametrize(
+    ("shape", "kind"), [([1, 3, 256, 320], TensorProto.FLOAT), ([1, 3, 320, 416], TensorProto.UINT8)]
+)
+def test_b7_c1_a_file_that_differs_in_its_input_alone_is_refused(tmp_path: Path, shape: list[int], kind: int) -> None:
+    path, answer = tmp_path / "own.onnx", np.zeros((1, 8, 2730), np.float32)
+    node = helper.make_node("Constant", [], ["output"], value=numpy_helper.from_array(answer))
+    ends = [helper.make_tensor_value_info(*end) for end in (("input", kind, shape), ("output", 1, answer.shape))]
+    graph = helper.make_graph([node], "own", ends[:1], ends[1:])
+    onnx.save(helper.make_model(graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8), str(path))
+    with pytest.raises(UserError, match="detector must have"):
+        OnnxEngine.load("detector", str(path), 1)
+
+
+def test_c11_masks_beside_the_candidates_are_left_alone(tmp_path: Path) -> None:
+    """An export with instance masks has a second output."""
+    path, masks = tmp_path / "own.onnx", np.zeros((1, 32, 80, 104), np.float32)
+    save(path, np.zeros((1, 8, 2730), np.float32), [1, 3, 320, 416])
+    model = onnx.load(str(path))
+    model.graph.node.append(helper.make_node("Constant", [], ["masks"], value=numpy_helper.from_array(masks)))
+    model.graph.output.append(helper.make_tensor_value_info("masks", TensorProto.FLOAT, masks.shape))
+    onnx.save(model, str(path))
+    evidence, _ = Perceiver(PerceptionConfig(detector=str(path)), stopwatch_ms).perceive(river(), HEADER, 0.0)
+    assert (evidence.usable, evidence.detections) == (True, ())

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from msgspec import inspect as types
 
+from paani import messages as m
 from paani.config import Config, EyeConfig, decode_config, encode_config, load_config, with_settings
 from paani.errors import UserError
 
@@ -220,3 +221,9 @@ def test_a_planner_looks_as_far_as_the_boat_needs_to_stop() -> None:
         load_config(sets=short)
     load_config(sets=[*short, "navigator.planner.use=false"])
     load_config(sets=[short[0], "navigator.planner.look_m=0.95"])
+
+
+def test_b16_a_calibration_without_a_field_of_view_is_none() -> None:
+    with pytest.raises(UserError, match="hfov_deg is not known"):
+        load_config(sets=["calibration.valid=true", "calibration.height_m=1"])
+    assert not m.PictureHeader(source_us=1, frame_seq=0, frame_epoch=0, width_px=4, height_px=3).calibrated

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from paani.config import DetectorConfig
+from paani.config import DetectorConfig, load_config
 from paani.messages import Label
 from paani_services.perception.box_decoding import decode_boxes, suppress_overlaps
 from paani_services.perception.preprocessing import (
@@ -140,3 +140,23 @@ def test_c8_boxes_overlap_by_more_than_0_45(shift: float, n: int) -> None:
     """C8: boxes of width 40 with an IoU of 25 / 55 = 0.4545 and of 24.6 / 55.4 = 0.4440."""
     pair = ((100, 100, 40, 40, 0.8, 0, 0, 0), (100 + shift, 100, 40, 40, 0, 0.9, 0, 0))
     assert len(decode_boxes(output(*pair), SAME, RULES)) == n
+
+
+@pytest.mark.parametrize("label", Label)
+def test_c6_every_class_counts_from_the_common_threshold_on(label: Label) -> None:
+    for rules in (RULES, load_config(profile="paper").perception.detections):
+        assert rules.threshold(label) == 0.40
+
+
+def test_c7_the_best_candidates_are_taken_wherever_they_stand() -> None:
+    """256 weak ones stand before a vessel."""
+    weak = [(8.0 + 4 * (i % 70), 20.0 + 40 * (i // 70), 3.0, 3.0, 0.41, 0, 0, 0) for i in range(256)]
+    best = (40.0, 200.0, 20.0, 20.0, 0, 0.9, 0, 0)
+    assert decode_boxes(output(*weak, best), SAME, RULES)[0].label is Label.VESSEL
+
+
+def test_c8_overlap_is_of_the_union_of_boxes_of_any_size() -> None:
+    """The second covers 0.46 of the first, the third 0.44, and the fourth lies diagonally apart."""
+    boxes = np.array([[0, 0, 10, 10], [0, 0, 10, 4.6], [0, 0, 10, 4.4], [20, 20, 30, 30]], np.float64).T
+    assert list(suppress_overlaps(boxes, 0.45)) == [0, 2, 3]
+    assert list(suppress_overlaps(boxes[:, [0, 3]], 0.45)) == [0, 1]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from paani_services.perception.colour_segmentation import segment_by_colour
+from paani_services.perception.corridors import OBSTACLE
 from tests.pictures import river, solid
 
 
@@ -13,3 +14,7 @@ def test_f1_colour_thresholds_separate_sky_water_and_obstacle() -> None:
     assert (mask[45:] == 0).mean() > 0.8
     assert (mask[:10] == 2).mean() > 0.8
     assert (segment_by_colour(solid(0, 0, 200)) == 1).mean() > 0.5
+
+
+def test_f1_what_is_dark_is_no_water() -> None:
+    assert (segment_by_colour(solid(10, 10, 10)) == OBSTACLE).all()

@@ -188,3 +188,32 @@ def test_below_the_water_edge_is_nothing_but_water_and_own_hull(seed: int, bare:
         row = round(edge * HEIGHT)
         assert set(mask[row:, column][counts[row:, column] > 0].tolist()) <= {WATER}
         assert row == 0 or mask[row - 1, column] != WATER or not counts[:, column].any()
+
+
+def test_e2_uncertainty_and_clear_width_are_of_the_rows_of_the_region() -> None:
+    mask, confidence = np.zeros((HEIGHT, WIDTH), np.uint8), ALL.copy()
+    mask[:19], confidence[:19] = OBSTACLE, 0.4
+    for lane in summarise_corridors(mask, confidence, CorridorConfig()):
+        assert (lane.uncertainty, lane.clear_width) == pytest.approx((0.0, 1.0), abs=1e-6)
+    mask = np.zeros((HEIGHT, WIDTH), np.uint8)
+    mask[47:] = OBSTACLE
+    assert summarise_corridors(mask, ALL, CorridorConfig(top=0.5)).center.clear_width == 0.0
+
+
+def test_e3_uncertainty_and_clear_width_are_of_the_columns_of_the_corridor() -> None:
+    """Column 24 lies in the left corridor, and with 0.2 of its width in the centre's."""
+    mask, confidence = np.zeros((HEIGHT, WIDTH), np.uint8), ALL.copy()
+    confidence[:, 24] = 0.0
+    lanes = summarise_corridors(mask, confidence, CorridorConfig())
+    assert [lane.uncertainty for lane in lanes] == pytest.approx([1 / 28.8, 0.2 / 30.4, 0.0], abs=1e-6)
+    mask[:, 10] = OBSTACLE
+    assert summarise_corridors(mask, ALL, CorridorConfig()).left.clear_width == pytest.approx((31.2 - 11) / 28.8)
+
+
+def test_e6_the_longest_run_counts_and_sixty_percent_of_water_make_a_column_clear() -> None:
+    mask = np.zeros((HEIGHT, WIDTH), np.uint8)
+    mask[:, 35] = OBSTACLE
+    assert summarise_corridors(mask, ALL, CorridorConfig()).center.clear_width == pytest.approx((55.2 - 36) / 30.4)
+    mask = np.zeros((HEIGHT, WIDTH), np.uint8)
+    mask[48:] = OBSTACLE  # 16 of 40 rows
+    assert summarise_corridors(mask, ALL, CorridorConfig(top=0.375)).center.clear_width == pytest.approx(1.0)

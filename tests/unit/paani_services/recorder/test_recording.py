@@ -294,3 +294,17 @@ def test_finished_and_open_files_are_synced_to_disk(tmp_path: Path, monkeypatch:
     synced.clear()
     recording.sync_to_disk()
     assert synced == [names(tmp_path)[-1]], "the last, now that it is finished; the others are on the disk"
+
+
+@pytest.mark.slow
+def test_a10_each_part_keeps_the_configuration(tmp_path: Path) -> None:
+    config = load_config(profile="paper")
+    recording = Recording(settings(tmp_path, part_s=1.0), describe_system(config), TOPICS)
+    record(recording, range(30))
+    recording.close([], now_us(30))
+    files = sorted(tmp_path.iterdir())
+    assert len(files) > 1
+    for path in files:
+        with path.open("rb") as file:
+            attached = {each.name: each.data for each in make_reader(file).iter_attachments()}
+        assert decode_config(attached["config.json"]) == config
