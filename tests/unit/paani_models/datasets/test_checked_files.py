@@ -116,3 +116,11 @@ def test_the_first_mistake_is_named_and_the_rest_counted() -> None:
     for mistakes, message in ((["a"], "a"), (["a", "b", "c"], r"a \(and 2 more\)")):
         with pytest.raises(UserError, match=f"^{message}$"):
             raise_first_mistake(mistakes)
+
+
+@pytest.mark.parametrize("row", ["0 .01 .5 .1 .1", "0 .5 .01 .1 .1", "0 .5 .99 .1 .1", "0 .97 .5 .1 .1"])
+def test_r8_a_box_beyond_any_edge_is_refused(tmp_path: Path, row: str) -> None:
+    label = tmp_path / "a.txt"
+    label.write_text(row)
+    with pytest.raises(UserError, match="a box outside"):
+        read_yolo(label, 7)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from paani.errors import UserError
+from paani_models.datasets import mastr1325 as mastr1325_source
 from paani_models.datasets.manifest import load_manifest
 from paani_models.datasets.mastr1325 import (
     VAL_FRAC,
@@ -140,3 +141,13 @@ def test_a_grey_mask_stored_in_three_channels_is_read(tmp_path: Path) -> None:
     write_picture(path, np.asarray(cv2.cvtColor(cv2.imread(str(path), 0), cv2.COLOR_GRAY2BGR), np.uint8))
     manifest, _ = prepare_mastr1325(raw, tmp_path / "out")
     assert read_mask(tmp_path / "out" / manifest.items[0].mask)[300, 0] == 0
+
+
+def test_w3_sequences_that_lie_in_two_parts_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As if no picture were known to be of the sequence of another."""
+    monkeypatch.setattr(
+        mastr1325_source, "group_sequences", lambda prints: {each.identity: each.identity for each in prints}
+    )
+    with pytest.raises(UserError, match="splits leak"):
+        prepare_mastr1325(mastr1325(tmp_path / "raw", (6, 6, 6)), tmp_path / "out")
+    assert not (tmp_path / "out").exists()

@@ -139,3 +139,20 @@ def test_drawn_boxes_belong_to_pictures_and_a_held_out_place_is_not_trained_on()
     held_out = {s.picture for s in pictures.boxed_samples(held_out=True) if s.source.drawn}
     assert 8 <= len(held_out) <= 20
     assert not held_out & {s.picture for s in pictures.boxed_samples(held_out=False)}
+
+
+def test_w3_sequences_are_whole_however_the_held_out_ones_are_chosen(tmp_path: Path) -> None:
+    """By one in so many, by the source's own lists, and by name."""
+    write_source(tmp_path / "river", {f"f{i}": f"seq{i % 6}" for i in range(60)})
+    samples = read_samples(tmp_path, [Source("river", "river", masks="masks", one_in=2)])
+    held_out, others = ({s.sequence for s in samples if s.held_out is side} for side in (True, False))
+    assert held_out
+    assert others
+    assert not held_out & others
+    (tmp_path / "lists").mkdir()
+    items = ",".join(f'{{"file":"images/{split}.jpg","split":"{split}"}}' for split in ("train", "val", "test"))
+    (tmp_path / "lists" / "manifest.json").write_text(f'{{"items":[{items}]}}')
+    source = Source("lists", "lists", masks="masks", splits=("train", "val", "test"))
+    assert [s.held_out for s in read_samples(tmp_path, [source])] == [False, True, True]
+    pier = next(source for source in SOURCES if source.name == "tampere_pier")
+    assert pier.held_out == ("dock_image_07", "dock_image_08", "dock_image_09")

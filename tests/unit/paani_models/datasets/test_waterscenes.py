@@ -246,3 +246,11 @@ def test_an_existing_folder_is_never_written_into(tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()
     with pytest.raises(UserError, match="already exists"):
         prepare_waterscenes(waterscenes(tmp_path / "raw"), tmp_path / "out")
+
+
+@pytest.mark.parametrize(("one", "other"), [("train", "val"), ("train", "test"), ("val", "test")])
+def test_r8_no_picture_is_in_any_two_lists(tmp_path: Path, one: str, other: str) -> None:
+    for number, split in enumerate(("train", "val", "test")):
+        (tmp_path / f"{split}.txt").write_text(f"{number}.jpg\n" + ("9.jpg\n" if split in {one, other} else ""))
+    with pytest.raises(UserError, match=rf"{other}\.txt: names 9 and so does {one}\.txt"):
+        read_lists(tmp_path)

@@ -10,6 +10,8 @@ import msgspec
 import numpy as np
 import pytest
 
+from paani_models.quantisation.acceptance import Timing
+
 onnx = pytest.importorskip("onnx", reason="needs the extra paani[train]")
 
 from onnx import TensorProto, helper, numpy_helper  # noqa: E402
@@ -319,3 +321,7 @@ def test_quantise_command_writes_net_record_and_verdict_t5_t6(
     (tmp_path / "list.txt").write_text(f"{held_out}\n")
     assert main([*words, "--calibrate", str(tmp_path / "list.txt")]) == 2
     assert "is held out" in capsys.readouterr().err
+
+
+def test_t5_the_times_are_told_as_int8_over_float() -> None:
+    assert Timing(6.969, 10.651).ratio == pytest.approx(10.651 / 6.969)

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from paani_models.datasets.sources import IGNORE
+from paani_models.datasets.sources import IGNORE, Sample, Source
+from paani_models.report import mask_calibration
 from paani_models.report.mask_calibration import (
     AS_IT_IS,
     TEMPERATURES,
@@ -54,3 +58,27 @@ def test_counts_are_those_of_a_picture_by_hand() -> None:
     assert counted.bins[AS_IT_IS].sum(0) == pytest.approx([2.0, 1.6, 1.0], rel=1e-5)
     large = np.zeros((1, 3, 256, 320), np.float32)
     assert count_cells(large, np.zeros((480, 640), np.uint8)).bins[0, :, 0].sum() == 64 * 80
+
+
+def test_z1_the_error_before_and_after_is_told_in_this_order() -> None:
+    cells = [count_cells(*picture(seed)) for seed in range(2)]
+    found = calibrate(np.array([each.loss for each in cells]), np.array([each.bins for each in cells]), pictures=2)
+    _, before, after = format_mask_calibration(found).splitlines()
+    assert f"{found.before.value:.4f}" in before
+    assert f"{found.after.value:.4f}" in after
+
+
+def test_z1_every_picture_of_a_sequence_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    cells = [count_cells(*picture(seed)) for seed in range(4)]
+    source = Source("river", "river", masks="masks")
+    samples = [Sample(source, sequence, True, Path("a.jpg"), Path("a.png"), None) for sequence in "aabb"]
+    monkeypatch.setattr(mask_calibration, "score_batches", lambda *_: cells)
+    found = mask_calibration.measure_mask_calibration(Path("net"), samples)
+    assert (found.cells, found.pictures, found.sequences) == (4 * 64 * 80, 4, 2)
+
+
+def test_z1_a_mask_that_is_made_smaller_has_no_class_between_two() -> None:
+    truth = np.tile(np.array([0, 0, 0, 2, 2, 2], np.uint8), (240, 54))
+    logits = np.zeros((1, 3, 64, 80), np.float32)
+    logits[0, 1] = -20.0
+    assert count_cells(logits, truth).loss[AS_IT_IS] == pytest.approx(64 * 80 * math.log(2.0), rel=1e-3)

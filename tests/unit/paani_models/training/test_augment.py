@@ -2,13 +2,25 @@
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 
-from paani_models.segmenter.paper_augmentation import AUGMENTATIONS, augment_paper_pair, jitter_colour_slightly
+from paani_models.segmenter.paper_augmentation import (
+    AUGMENTATIONS,
+    BRIGHTNESS,
+    CONTRAST,
+    FLIP_FRAC,
+    HUE,
+    JITTER_FRAC,
+    SATURATION,
+    augment_paper_pair,
+    jitter_colour_slightly,
+)
 from paani_models.training import augment
+from paani_models.training.augment import BLOB_FRAC, GLARE_FRAC, GLITTER_FRAC, augment_segmenter_pair
 
 SIZE_WH = (320, 256)
 WATER_CLASS, OBSTACLE_CLASS = 0, 1
@@ -198,3 +210,17 @@ def test_mirrored_water_changes_water_only() -> None:
     assert mirrored[50:, :, 0].mean() > 60
     dry = np.full((96, 128), 1, np.uint8)
     assert np.array_equal(augment.mirror_banks_in_water(np.random.default_rng(0), picture, dry), picture)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("augment_pair", [augment_paper_pair, augment_segmenter_pair])
+def test_s12_a_whole_augmentation_repeats_to_the_byte(augment_pair: Callable[..., Any]) -> None:
+    picture, mask = scene()[:2]
+    for seed in range(12):
+        one, other = (augment_pair(np.random.default_rng(seed), picture, mask, SIZE_WH)[0] for _ in range(2))
+        np.testing.assert_array_equal(one, other)
+
+
+def test_s8_every_share_and_range_is_the_papers() -> None:
+    assert (FLIP_FRAC, JITTER_FRAC, GLARE_FRAC, BLOB_FRAC, GLITTER_FRAC) == (0.5, 0.5, 0.35, 0.7, 0.6)
+    assert (BRIGHTNESS, CONTRAST, SATURATION, HUE) == (0.2, 0.2, 0.2, 0.05)

@@ -40,3 +40,9 @@ def test_f3_without_a_trusted_mask_both_components_are_the_defaults(config: Conf
     advice = play([frame], config)[1][0]
     for lane in (advice.left, advice.center, advice.right):
         assert (lane.non_water, lane.uncertainty) == (share, share)
+
+
+def test_x6_advice_and_tracks_are_of_one_observation() -> None:
+    _, advice, tracks = play([water(0.4976, 0.5114, 0.4573)] * 8, PAPER, 0.1)
+    for one, other in zip(advice, tracks, strict=True):
+        assert (one.frame_epoch, one.frame_seq, one.source_us) == (other.frame_epoch, other.frame_seq, other.source_us)

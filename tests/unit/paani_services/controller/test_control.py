@@ -285,3 +285,21 @@ def test_an_order_astern_that_makes_no_sense_is_invalid(astern_mps: float) -> No
         assert thrust.inhibits == (Inhibit.COMMAND_INVALID,)
     _, both = run(PAANI, command(speed_mps=0.2, astern_mps=0.2), odometry())
     assert both.inhibits == (Inhibit.COMMAND_INVALID,)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0], ids=["left", "right"])
+def test_n4_n5_n7_steering_to_either_side(side: float) -> None:
+    """P and D of a small error; of a large one the limit, which the rate of a turn back does not pass."""
+    thrust = settle(PAPER, command(heading_rad=side * 0.2), odometry(yaw_rate_radps=side * 0.1))
+    assert (thrust.right - thrust.left) / 2.0 == pytest.approx(side * (0.08 * 0.2 - 0.05 * 0.1))
+    order = command(heading_rad=side * 2.0, speed_mps=0.30)
+    thrust = settle(PAPER, order, odometry(surge_mps=0.1, yaw_rate_radps=-side * 0.5))
+    assert (thrust.left, thrust.right) == pytest.approx((0.064 - side * 0.04, 0.064 + side * 0.04))
+
+
+def test_n7_no_fan_is_asked_for_more_than_all_it_has() -> None:
+    strong = msgspec.structs.replace(
+        PAPER, max_forward=1.0, max_steer=0.5, speed_feed_forward=4.0, heading_kp=1.0, slew_per_s=10.0
+    )
+    thrust = settle(strong, command(heading_rad=2.0, speed_mps=0.30), odometry(surge_mps=0.30))
+    assert (thrust.left, thrust.right) == (0.5, 1.0)

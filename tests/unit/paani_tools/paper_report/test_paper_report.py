@@ -216,3 +216,21 @@ def test_a_run_of_the_board_protocol_takes_its_place(tmp_path: Path, capsys: pyt
     printed = capsys.readouterr().out
     assert "paper, UNO Q" in printed
     assert "| 300 / 151 | 12 / 6 |" in printed
+
+
+def test_each_of_the_papers_figures_stands_in_its_own_place() -> None:
+    for still in published.STILLS:
+        assert "{:.4f} left, {:.4f} center and {:.4f} right".format(*still.risks) in SAYS[still.statement]
+    assert f"Each of {published.STALE_PROBES} probes" in SAYS["V16"]
+    validation, others = (
+        published.DETECTOR_VALIDATION,
+        {row: text.split(" / ") for row, _, text in published.DETECTOR_OTHERS},
+    )
+    assert "mAP50 {} and mAP50-95 {}".format(*others["V3"]) in SAYS["V3"]
+    test, onnx = others["V6"]
+    assert f"{validation['pier']:.6f} on validation, {test} on test and {onnx} with the ONNX file" in SAYS["V6"]
+    found = published.SEGMENTER
+    assert (
+        f"mIoU {found['miou']:.6f}, IoU {found['iou_water']:.6f} for water, {found['iou_obstacle']:.6f} for obstacle"
+        f" and {found['iou_sky']:.6f} for sky, and edge F1 {found['edge_f1']:.6f}" in SAYS["V8"]
+    )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import cv2
 import msgspec
@@ -12,12 +13,16 @@ import pytest
 from onnx import TensorProto, helper, numpy_helper
 
 from paani import messages as m
+from paani.cli import main
 from paani.cli import main as paani
+from paani.clock import stopwatch_ms
 from paani.config import load_config
 from paani_models.catalogue import load_catalogue
 from paani_services.advisor.advise import advise
+from paani_services.perception.pipeline import Perceiver
+from paani_tools.look.verdict import Verdict
 from paani_tools.scenario.command import StillsReport, TrajectoriesReport
-from paani_tools.scenario.stills import STALE_AGE_S
+from paani_tools.scenario.stills import STALE_AGE_S, present_still
 from paani_tools.scenario.trajectories import families
 from tests.pictures import PICTURES, river
 from tests.unit.paani_services.advisor.advisor_evidence import CLEAR, PAPER, box, lane, play, seeing, water
@@ -216,3 +221,34 @@ def dark_is_water() -> bytes:
     model.ir_version = 9
     onnx.checker.check_model(model)
     return bytes(model.SerializeToString())
+
+
+@pytest.mark.slow
+def test_v16_probes_that_are_not_stale_are_not_told_to_stop(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    picture = tmp_path / "river.png"
+    cv2.imwrite(str(picture), PICTURES["river"])
+    sets = ["--set", "advisor.evidence_max_age_s=20", "--set", "advisor.lifetime_s=20"]
+    assert main(["scenario", str(picture), *sets]) == 0
+    assert "2/5 STOP" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_u8_x7_a_black_picture_is_presented_eight_times_a_tenth_of_a_second_apart(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    config, presented_us = load_config(), []
+
+    def advise_noting(state: Any, evidence: Any, now_us: int, settings: Any) -> Any:
+        presented_us.append((evidence.source_us, now_us))
+        return advise(state, evidence, now_us, settings)
+
+    monkeypatch.setattr("paani_tools.look.verdict.advise", advise_noting)
+    perceiver = Perceiver(config.perception, stopwatch_ms)
+    (black,) = present_still([], perceiver, config)
+    perceiver.close()
+    assert isinstance(black, Verdict)
+    assert black.bgr is not None
+    assert not black.bgr.any()
+    assert [stamp_us - presented_us[0][0] for stamp_us, _ in presented_us] == [100_000 * k for k in range(8)]
+    assert all(stamp_us == now_us for stamp_us, now_us in presented_us)
+    assert config.perception.image_quality.enabled

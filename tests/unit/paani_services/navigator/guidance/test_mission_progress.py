@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from paani import keys
 from paani.config import load_config
 from paani.decider import Input
-from paani.messages import Direction, Inhibit, LegKind, Mission, MissionLeg, Route, Waypoint
+from paani.messages import Arming, Direction, Inhibit, LegKind, Mission, MissionLeg, Odometry, Route, Waypoint
 from paani_services.navigator.decide import DECIDER
+from paani_services.navigator.guidance.mission_progress import MissionInputs, MissionProgress, advance_mission
 from paani_services.navigator.navigate import NavigatorState
 from tests.unit.paani_services.navigator.drifting_boat import DriftingBoat
 
@@ -213,3 +214,12 @@ def test_the_decider_follows_the_mission_before_the_route() -> None:
     assert Inhibit.NO_ROUTE not in alone[keys.COMMAND.name].inhibits  # type: ignore[attr-defined]
     assert DECIDER.own == (keys.ROUTE, keys.MISSION)
     assert given_both.keys() == {keys.COMMAND.name}
+
+
+@pytest.mark.parametrize(("is_straight", "leg_index"), [(False, 0), (True, 1)])
+def test_m1_a_turn_does_not_end_the_leg_home(is_straight: bool, leg_index: int) -> None:
+    mission = Mission(source_us=0, name="m", legs=(HOME, STOP), home=at(0.0, 0.0))
+    begun = MissionProgress(leg_start=Waypoint(x_m=-10.0, y_m=0.0), target=1)
+    odometry = Odometry(source_us=0, x_m=0.0, y_m=0.0, yaw_rad=0.0, surge_mps=0.1, healthy=True)
+    now = MissionInputs(odometry, Arming(source_us=0, armed=True), 1, is_free=True, is_straight=is_straight)
+    assert advance_mission(begun, mission, now, load_config().navigator).leg_index == leg_index

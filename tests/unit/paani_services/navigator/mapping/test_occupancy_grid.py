@@ -24,7 +24,7 @@ from paani_services.navigator.mapping.occupancy_grid import (
 from paani_services.navigator.mapping.projection import Pose, pinhole_at, pixel_rays, ranges_to_water_m
 from paani_sim.eye.camera import BoatPose, project
 from paani_sim.eye.camera import Camera as Eye
-from tests.synthetic_water import AT_REST, CAMERA, CONFIG, EYE, PLANNER, START_US, observe_from, water_edge_of
+from tests.synthetic_water import ASTERN, AT_REST, CAMERA, CONFIG, EYE, PLANNER, START_US, observe_from, water_edge_of
 
 ASPECT = 320 / 240
 PAPER = load_config(profile="paper").navigator.planner
@@ -360,3 +360,19 @@ def test_a_valid_calibration_is_complete() -> None:
     with pytest.raises(UserError, match="valid: height_m is not known"):
         load_config(sets=["calibration.hfov_deg=60", "calibration.valid=true"])
     assert not CONFIG.calibration.valid
+
+
+def test_q1_q3_the_range_limit_and_both_lifetimes_to_the_hundredth() -> None:
+    camera = pinhole_at(Pose(0.0, 0.0, 0.0, 0.0, 0.0), CAMERA.calibration, ASPECT)
+    rays = pixel_rays(camera, np.array([0.5]), np.array([1.0]))
+    (at_m,) = ranges_to_water_m(camera, rays, 30.0)
+    assert [bool(np.isfinite(ranges_to_water_m(camera, rays, at_m + d))[0]) for d in (0.01, -0.01)] == [True, False]
+    memory = observe_from(edge=water_edge_of(AT_REST, AHEAD_5_M))
+    at_us = memory.observations[-1].stamp_us
+    grid = build_occupancy_grid(memory.observations, (0.0, 0.0), at_us + 1_990_000, CAMERA, PAPER)
+    assert cell(grid, 5.0, 0.0) == "occupied"
+    # What the next picture does not show stays free as long as if none had come.
+    memory = observe_from(ASTERN, at_us=START_US + 300_000, memory=memory)
+    for age_us, found in ((790_000, "free"), (810_000, "unknown")):
+        grid = build_occupancy_grid(memory.observations, (0.0, 0.0), at_us + age_us, CAMERA, PAPER)
+        assert cell(grid, 3.5, 0.0) == found

@@ -13,6 +13,7 @@ from paani import messages as m
 from paani.board_status import BoardStatus, ProcessStatus
 from paani.clock import WallClock
 from paani.statistics.figure_table import table_text
+from paani_tools.bench.board import command, poll
 from paani_tools.bench.board.figures import board_figures, is_stale, spread
 from paani_tools.bench.board.host_counters import HostSample
 from paani_tools.bench.board.machine import MachineIdentity
@@ -260,3 +261,20 @@ async def test_an_interrupted_run_keeps_what_it_has(monkeypatch: pytest.MonkeyPa
         await asyncio.to_thread(two.wait)
     assert 2 <= len(done) < 10_000
     assert board_figures(done, 10_000).answered == len(done)
+
+
+def test_u10_x8_what_is_counted_of_polls_and_what_of_results() -> None:
+    """A result of a restarted camera is another; of a poll without an answer the host is still known."""
+    assert (command._parser().parse_args([]).polls, poll.PERIOD_S) == (300, 1.0)
+    run = polls(2, 1.0)
+    first, second = (each.status for each in run)
+    assert first is not None
+    assert second is not None
+    assert first.evidence is not None
+    renumbered = replace(second, evidence=replace(first.evidence, frame_epoch=2))
+    assert board_figures([run[0], replace(run[1], status=renumbered)], 2).distinct_results == 2
+    run = polls(10, 2.0)
+    run[9] = replace(run[9], status=None, failure="timed out")
+    figures = board_figures(run, 10)
+    assert (figures.frame_age_s.samples, figures.pipeline_ms.samples) == (5, 5)
+    assert (figures.temperature_c.samples, figures.cpu_percent.samples) == (10, 9)
