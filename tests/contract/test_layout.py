@@ -124,6 +124,9 @@ def test_served_files_name_no_other_host() -> None:
             text = re.sub(r"\A/\*!.*?\*/", "", text)  # where a vendored library comes from
             assert "http://" not in text, path
             assert "https://" not in text, path
+            assert not re.search(r"""(?:src|href|action)\s*=\s*["']//|url\(["']?//|["']//[\w.-]+\.\w{2,}/""", text), (
+                path
+            )
 
 
 @pytest.mark.parametrize("folder", ["uplot", "preact"])

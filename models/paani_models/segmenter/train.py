@@ -39,6 +39,7 @@ from paani_models.training.training_state import (
     TrainingState,
     append_record,
     learning_rate,
+    mixed_precision,
     stage_at_epoch,
     to_device,
 )
@@ -188,6 +189,9 @@ class SegmenterTraining:
         return float(np.mean(losses))
 
     def _loss(self, pictures: Tensor, masks: Tensor) -> Tensor:
+        if self.recipe.as_in_paper:
+            with mixed_precision():  # S7
+                return segmenter_loss(self.model(pictures), masks)
         if self.distillation is None:
             return segmenter_loss(self.model(pictures), masks)
         logits, distance = self.distillation(pictures, self.model)
