@@ -178,3 +178,15 @@ def test_k4_k8_the_boat_weighs_12_4_kg_to_whatever_side_it_is_pushed(open_plant:
     plant.place(0.0, 0.0, yaw_rad)
     plant.step(1.0, 1.0)
     assert plant.velocity[0] == pytest.approx(2.0 / 12.4 * STEP_S, rel=0.01)
+
+
+@pytest.mark.parametrize(("axis", "inertia_kgm2"), [(1, 0.86), (2, 1.45)], ids=["roll", "pitch"])
+def test_k7_a_tilted_boat_is_turned_upright_by_the_whole_stiffness(
+    open_plant: OpenPlant, axis: int, inertia_kgm2: float
+) -> None:
+    """0.1 rad, for one step of the engine, which damps a little of it at once."""
+    plant = open_plant()
+    plant.place(0.0, 0.0, 0.0)
+    plant._qpos[3], plant._qpos[3 + axis] = math.cos(0.05), math.sin(0.05)
+    plant.step(0.0, 0.0)
+    assert plant._qvel[2 + axis] == pytest.approx(-90.0 * 0.1 / inertia_kgm2 * STEP_S, rel=0.25)
