@@ -314,6 +314,8 @@ def test_quantise_command_writes_net_record_and_verdict_t5_t6(
     assert "rejected: loses" in capsys.readouterr().out
     record = msgspec.json.decode((tmp_path / "segmenter-paper.json").read_bytes(), type=QuantisationRecord)
     assert record.float_score - record.score > 0.05
+    loss = float(record.verdict.reason.removeprefix("loses ").split()[0])
+    assert loss == pytest.approx(100.0 * (record.float_score - record.score), abs=0.02)
     assert not record.verdict.accepted
     assert record.size_bytes < 0.4 * record.float_size_bytes
     assert (tmp_path / "segmenter-paper.onnx").stat().st_size == record.size_bytes
