@@ -305,6 +305,7 @@ def test_b7_c1_a_file_that_differs_in_its_input_alone_is_refused(tmp_path: Path,
         OnnxEngine.load("detector", str(path), 1)
 
 
+@pytest.mark.slow
 def test_c11_masks_beside_the_candidates_are_left_alone(tmp_path: Path) -> None:
     """An export with instance masks has a second output."""
     path, masks = tmp_path / "own.onnx", np.zeros((1, 32, 80, 104), np.float32)

@@ -143,6 +143,7 @@ def test_a_grey_mask_stored_in_three_channels_is_read(tmp_path: Path) -> None:
     assert read_mask(tmp_path / "out" / manifest.items[0].mask)[300, 0] == 0
 
 
+@pytest.mark.slow
 def test_w3_sequences_that_lie_in_two_parts_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As if no picture were known to be of the sequence of another."""
     monkeypatch.setattr(

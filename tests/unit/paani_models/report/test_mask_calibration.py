@@ -68,6 +68,7 @@ def test_z1_the_error_before_and_after_is_told_in_this_order() -> None:
     assert f"{found.after.value:.4f}" in after
 
 
+@pytest.mark.slow
 def test_z1_every_picture_of_a_sequence_counts(monkeypatch: pytest.MonkeyPatch) -> None:
     cells = [count_cells(*picture(seed)) for seed in range(4)]
     source = Source("river", "river", masks="masks")

@@ -75,6 +75,7 @@ async def test_a8_every_two_seconds_the_newest_picture_of_a_webcam_is_taken(monk
     assert np.diff(taken_us).tolist() == [2_000_000] * 4
 
 
+@pytest.mark.slow
 async def test_b2_i17_a_later_pass_has_another_epoch_and_each_picture_its_own_time(tmp_path: Path) -> None:
     for name in "abc":
         (tmp_path / f"{name}.jpg").write_bytes(encode_jpeg(river(ord(name)), 85))

@@ -318,6 +318,7 @@ def test_refused_pictures_leave_at_most_one_run_under_way(monkeypatch: pytest.Mo
     eyes.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("picture", [river(), PICTURES["black"]], ids=["river", "black"])
 def test_i17_evidence_has_its_pictures_own_time(picture: U8) -> None:
     header = msgspec.structs.replace(HEADER, media_us=1_234, time_base=m.TimeBase.MEDIA)
