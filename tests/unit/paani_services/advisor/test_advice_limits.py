@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import msgspec
 import pytest
 
@@ -126,3 +128,34 @@ def test_j13_a_track_in_danger_contributes_at_first_sight() -> None:
 
 def test_j16_advice_lives_for_three_and_a_half_seconds() -> None:
     assert play([CLEAR])[1][0].lifetime_s == 3.5
+
+
+@BOTH
+def test_j2_both_corridors_count_a_box_by_its_share_in_each(config: Config) -> None:
+    """Of a width of 0.2, 0.09 lie in the left corridor and 0.19 in the centre."""
+    frames = [seeing(box(BUOY, (0.30, 0.2, 0.50, bottom))) for bottom in (0.40, 0.45)]
+    _, advice, tracks = play(frames, config)
+    weight, urgency = severity(0.8, (0.30, 0.2, 0.50, 0.45)), tracks[1].tracks[0].urgency
+    assert urgency > 0.5
+    for found, share in ((advice[1].left, 0.45), (advice[1].center, 0.95), (advice[1].right, 0.0)):
+        assert (found.obstacle, found.urgency) == pytest.approx((share * weight, share * urgency))
+
+
+@BOTH
+def test_j3_j4_a_risk_is_of_every_accepted_track_and_of_the_water(config: Config) -> None:
+    """Three that grow count, a fourth does not at first sight; non-water is 0.2, uncertainty 0.3."""
+    grown = [[(x, 0.35 - d, x + 0.1, 0.5) for x, d in ((0.32, k), (0.45, 2 * k), (0.58, 3 * k))] for k in (0.0, 0.01)]
+    first, second = (seeing(*(box(BUOY, xyxy) for xyxy in boxes)) for boxes in grown)
+    fourth = box(BUOY, (0.45, 0.60, 0.55, 0.64))
+    second = msgspec.structs.replace(
+        second, detections=(*second.detections, fourth), center=m.LaneEvidence(non_water=0.2, uncertainty=0.3)
+    )
+    _, advice, tracks = play([first, second], config)
+    urgencies = [track.urgency for track in tracks[1].tracks]
+    assert all(urgency > 0.05 for urgency in urgencies[:3])
+    assert [track.accepted for track in tracks[1].tracks] == [True, True, True, False]
+    obstacle = 1.0 - math.prod(1.0 - severity(0.8, xyxy) for xyxy in grown[1])
+    urgency = 1.0 - math.prod(1.0 - each for each in urgencies)
+    center = advice[1].center
+    assert (center.obstacle, center.urgency) == pytest.approx((obstacle, urgency))
+    assert center.risk == pytest.approx(0.55 * 0.2 + 0.65 * obstacle + 0.20 * urgency + 0.15 * 0.3)

@@ -128,6 +128,13 @@ def test_a_future_frame_leaves_no_trace() -> None:
         msgspec.structs.replace(CLEAR, left=m.LaneEvidence(non_water=math.nan)),
         msgspec.structs.replace(CLEAR, right=m.LaneEvidence(uncertainty=-0.1)),
         msgspec.structs.replace(CLEAR, center=m.LaneEvidence(clear_width=1.5)),
+        msgspec.structs.replace(CLEAR, water_edge=(0.5, math.nan)),
+        msgspec.structs.replace(
+            CLEAR,
+            candidates=(
+                m.Candidate(kind=m.CandidateKind.LONE_OBSTACLE, confidence=0.2, box_xyxy=(0.5, 0.5, 0.4, 0.6)),
+            ),
+        ),
     ],
 )
 def test_malformed_evidence_stops(bad: m.Evidence) -> None:

@@ -28,6 +28,7 @@ Box = tuple[float, float, float, float]
 BUOY = m.Label.BUOY
 WINDOW = Window(1.5, 0.75)
 MIDDLE = (0.44, 0.44, 0.56, 0.56)
+BOTH = pytest.mark.parametrize("config", [PAANI, PAPER], ids=["paani", "paper"])
 
 
 def measured(sizes: list[float], confidences: list[float], step_us: int) -> tuple[MotionHistory, int]:
@@ -142,3 +143,87 @@ def test_i20_a_motion_changes_no_advice_whatever_moves(label: m.Label, growth: f
     assert tracks[-1].tracks[0].motion is state
     assert other_tracks[-1].tracks[0].motion is MotionState.UNKNOWN
     assert msgspec.json.encode(advice) == msgspec.json.encode(other_advice)
+
+
+def test_i1_the_rate_is_the_slope_of_the_least_squares() -> None:
+    """Sizes 0, 0.1, 0, 0.1 and 0.2 have a slope of 0.04 a sample, and of 0.05 from the first to the last."""
+    history, at_us = measured([0.0, 0.1, 0.0, 0.1, 0.2], [0.8] * 5, 200_000)
+    assert estimate_motion(history, at_us, WINDOW, PAPER.advisor.motion).rate_per_s == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize(("wide", "tall"), [(0.0, 0.3), (0.3, 0.0), (0.1, 0.2)], ids=["taller", "wider", "both"])
+def test_i1_the_size_is_half_the_logarithm_of_the_area(wide: float, tall: float) -> None:
+    sides = [(0.05 * math.exp(wide * 0.2 * i), 0.05 * math.exp(tall * 0.2 * i)) for i in range(8)]
+    _, _, tracks = play([seeing(box(BUOY, (0.5 - w, 0.5 - h, 0.5 + w, 0.5 + h))) for w, h in sides], PAPER)
+    assert tracks[-1].tracks[0].motion_rate_per_s == pytest.approx(0.15)
+
+
+@BOTH
+@pytest.mark.parametrize("side", range(4), ids=["left", "top", "right", "bottom"])
+def test_i10_nothing_of_before_a_box_is_cut_off_is_left(config: Config, side: int) -> None:
+    before, cut = [0.02, 0.02, 0.98, 0.98], [0.02, 0.02, 0.98, 0.98]
+    cut[side] = (0.0, 0.0, 1.0, 1.0)[side]
+    whole, part = (seeing(box(BUOY, (x1, y1, x2, y2))) for x1, y1, x2, y2 in (before, cut))
+    state, _, tracks = play([*[whole] * 6, part], config)
+    assert [frame.tracks[0].motion_cause for frame in tracks[5:]] == [MotionCause.NONE, MotionCause.CLIPPED_BY_FRAME]
+    assert state.tracker.tracks[0].identity.motion.samples == ()
+
+
+@BOTH
+@pytest.mark.parametrize("back_us", [0, 1, 100_000, 5_000_000])
+def test_i14_a_frame_that_is_not_later_than_the_one_before_begins_again(config: Config, back_us: int) -> None:
+    state, _, _ = play([seeing(BUOY_AHEAD)] * 6, config)
+    at_us = T0_US + 1_000_000 - back_us
+    frame = msgspec.structs.replace(seeing(BUOY_AHEAD), frame_seq=6, source_us=at_us)
+    state, _, tracks = advise(state, frame, at_us, config)
+    assert (tracks.tracks[0].motion, tracks.tracks[0].motion_cause) == (MotionState.UNKNOWN, MotionCause.TIME_REVERSED)
+    assert [sample.at_us for sample in state.tracker.tracks[0].identity.motion.samples] == [at_us]
+
+
+@BOTH
+@pytest.mark.parametrize("epoch", [0, 2])
+def test_i15_another_epoch_begins_again_whichever_number_it_has(config: Config, epoch: int) -> None:
+    state, _, tracks = play([seeing(BUOY_AHEAD)] * 6, config)
+    assert tracks[-1].tracks[0].motion_cause is MotionCause.NONE
+    frame = msgspec.structs.replace(seeing(BUOY_AHEAD), frame_epoch=epoch, source_us=T0_US + 1_200_000)
+    state, _, again = advise(state, frame, T0_US + 1_200_000, config)
+    assert (again.tracks[0].motion, again.tracks[0].motion_cause) == (MotionState.UNKNOWN, MotionCause.EPOCH_CHANGE)
+    assert len(state.tracker.tracks[0].identity.motion.samples) == 1
+
+
+@BOTH
+@pytest.mark.parametrize(
+    ("beta", "margin", "state"),
+    [
+        (0.11, 0.06, MotionState.APPROACHING),
+        (0.09, 0.06, MotionState.UNKNOWN),
+        (-0.11, 0.06, MotionState.RECEDING),
+        (-0.09, 0.06, MotionState.UNKNOWN),
+        (0.0, 0.035, MotionState.STEADY),
+        (0.01, 0.035, MotionState.UNKNOWN),
+        (-0.01, 0.035, MotionState.UNKNOWN),
+    ],
+)
+def test_i3_i4_a_state_is_of_the_whole_interval(config: Config, beta: float, margin: float, state: MotionState) -> None:
+    """Five samples whose residuals give this margin; every interval ends within 0.01 of the dead band's edge."""
+    sizes = [0.2 * beta * i + margin / 3.0 * (i % 2) for i in range(5)]
+    history, at_us = measured(sizes, [0.8] * 5, 200_000)
+    estimate = estimate_motion(history, at_us, WINDOW, config.advisor.motion)
+    assert (estimate.rate_per_s, estimate.margin_per_s) == pytest.approx((beta, margin))
+    assert estimate.state is state
+
+
+@BOTH
+def test_i6_eight_samples_of_less_than_four_tenths_of_a_second_are_too_short(config: Config) -> None:
+    history, at_us = measured([0.3 * 0.05 * i for i in range(8)], [0.9] * 8, 50_000)
+    assert estimate_motion(history, at_us, WINDOW, config.advisor.motion).cause is MotionCause.TOO_SHORT
+
+
+@pytest.mark.parametrize("beta", [0.3, -0.3, 0.0])
+@pytest.mark.parametrize(("confidence", "is_known"), [(0.55, False), (0.65, True)])
+def test_i8_no_state_is_known_by_a_quality_below_a_quarter(beta: float, confidence: float, is_known: bool) -> None:
+    """Five exact samples over 0.41 s: 0.41 * 0.625 * confidence / 0.6, which is 0.235 or 0.256."""
+    history, at_us = measured([beta * 0.1025 * i for i in range(5)], [confidence] * 5, 102_500)
+    estimate = estimate_motion(history, at_us, WINDOW, PAPER.advisor.motion)
+    assert (estimate.state is not MotionState.UNKNOWN) is is_known
+    assert estimate.cause is (MotionCause.NONE if is_known else MotionCause.LOW_QUALITY)

@@ -113,16 +113,23 @@ def test_a_tie_resumes_the_side_after_a_stop() -> None:
         pytest.param((0.30, 0.30, 0.40, 0.62), D.SLIGHT_RIGHT, R.CENTER_EDGE_INCURSION, id="left-edge"),
         pytest.param((0.60, 0.30, 0.70, 0.62), D.SLIGHT_LEFT, R.CENTER_EDGE_INCURSION, id="right-edge"),
         pytest.param((0.40, 0.30, 0.50, 0.62), D.RIGHT, R.CENTER_RISK, id="core"),
+        pytest.param((0.305, 0.30, 0.4049, 0.62), D.SLIGHT_RIGHT, R.CENTER_EDGE_INCURSION, id="up-to-the-core"),
+        pytest.param((0.305, 0.30, 0.4051, 0.62), D.RIGHT, R.CENTER_RISK, id="into-the-core"),
+        pytest.param((0.5951, 0.30, 0.695, 0.62), D.SLIGHT_LEFT, R.CENTER_EDGE_INCURSION, id="from-the-core-on"),
+        pytest.param((0.5949, 0.30, 0.695, 0.62), D.LEFT, R.CENTER_RISK, id="into-the-core-from-the-right"),
     ],
 )
-def test_j9_edge_is_slight_and_core_is_full(xyxy: m.BoxXyxy, direction: m.Direction, reason: m.Reason) -> None:
+@pytest.mark.parametrize("config", [PAANI, PAPER], ids=["paani", "paper"])
+def test_j9_edge_is_slight_and_core_is_full(
+    config: Config, xyxy: m.BoxXyxy, direction: m.Direction, reason: m.Reason
+) -> None:
     """J9: an obstacle in an edge of the centre corridor is a slight turn, one in its core a full turn."""
     evidence = msgspec.structs.replace(
         CLEAR, left=lane(0.25), center=lane(0.30), right=lane(0.20), detections=(box(PIER, xyxy, 0.9),)
     )
     if direction is D.SLIGHT_LEFT:
         evidence = msgspec.structs.replace(evidence, left=lane(0.20), right=lane(0.25))
-    _, advice, _ = play([evidence] * 2)
+    _, advice, _ = play([evidence] * 2, config)
     assert advice[1].center.risk >= 0.48
     assert (advice[1].direction, advice[1].reason) == (direction, reason)
 

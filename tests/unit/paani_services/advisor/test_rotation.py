@@ -29,7 +29,7 @@ from paani_services.advisor.rotation import (
     predict_boxes,
 )
 from paani_sim.eye.camera import BoatPose, Camera, project
-from tests.unit.paani_services.advisor.advisor_evidence import CLEAR, PAANI, PAPER, T0_US, box, seeing
+from tests.unit.paani_services.advisor.advisor_evidence import BUOY_AHEAD, CLEAR, PAANI, PAPER, T0_US, box, seeing
 
 U = m.RotationUse
 OFF = load_config(sets=["advisor.motion.compensate_rotation=false"])
@@ -188,6 +188,7 @@ def test_the_tracks_say_what_was_known_of_the_turning(
     assert tracks.rotation is use
     state = append_attitude((), odometry(T0_US - round(age_s * 1e6), 0.0))
     assert (camera_view(state, frame, config).attitude is not None) == (use is U.KNOWN)
+    assert (camera_view(state, frame, config).lens is None) == (use in {U.OFF, U.UNKNOWN_LENS})  # of sizes as angles
 
 
 def test_odometry_is_an_input_of_the_decider() -> None:
@@ -358,3 +359,14 @@ def test_a_box_that_stays_where_the_odometry_says_that_it_left_keeps_its_identit
         found.append(tracks.tracks)
     assert [[track.id for track in tracks] for tracks in found] == [[1], [1]]
     assert found[1][0].motion_cause is m.MotionCause.AMBIGUOUS_ASSOCIATION
+
+
+def test_g11_a_track_that_is_only_predicted_keeps_its_score_while_the_boat_turns() -> None:
+    state, confidences = AdvisorState(), []
+    for number, detections in enumerate(((BUOY_AHEAD,), (BUOY_AHEAD,), (), ())):
+        at_us = T0_US + number * 200_000
+        frame = msgspec.structs.replace(CLEAR, source_us=at_us, frame_seq=number, detections=detections)
+        state, _, tracks = advise(state, frame, at_us, PAANI, odometry(at_us, 0.01 * number, 0.05))
+        assert tracks.rotation is U.KNOWN
+        confidences += [(track.held, track.confidence) for track in tracks.tracks]
+    assert confidences == [(False, 0.8), (False, 0.8), (True, 0.8), (True, 0.8)]
