@@ -157,6 +157,12 @@ def test_a_graph_has_credentials_of_its_own(tmp_path: Any) -> None:
         ("hull", ["bus.graph=simulation"], r"bus\.graph 'simulation' .* profile 'hull'"),
         ("hull", ["bus.graph=hil"], r"bus\.graph 'hil'"),
         ("hull", ["camera.source=sim"], r"camera\.source 'sim': a hull has no simulated camera"),
+        (
+            None,
+            ["thrusters.autopilot.line=serial:/dev/ttyUSB0@57600"],
+            r"thrusters\.autopilot\.line .* drives a real boat alone",
+        ),
+        ("hil", ["thrusters.line=serial:/dev/ttyUSB0@115200"], r"thrusters\.line .* drives an emulator alone"),
         ("hull", ["up.arm_at_start=true"], r"up\.arm_at_start: profile hull waits for its operator"),
         ("hil", ["up.arm_at_start=true"], r"up\.arm_at_start: profile hil waits for its operator"),
     ],

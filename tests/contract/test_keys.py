@@ -59,6 +59,12 @@ def test_a_row_is_complete(topic: keys.Topic[Any]) -> None:
     assert topic.summary
 
 
+@pytest.mark.parametrize("topic", ROWS, ids=lambda row: row.name)
+def test_a6_a_message_carries_the_domain_of_its_bus(topic: keys.Topic[Any]) -> None:
+    for domain in (43, 7):
+        assert topic.stamp(minimal(topic.type), domain=domain, seq=1, epoch=2, sent_us=3).domain == domain
+
+
 def test_names_are_unique() -> None:
     names = [topic.name for topic in keys.TOPICS]
     assert len(set(names)) == len(names)

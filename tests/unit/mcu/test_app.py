@@ -30,13 +30,15 @@ def test_a2_the_nets_run_on_the_cpu_alone_and_the_app_asks_for_no_brick() -> Non
             sessions += re.findall(r"InferenceSession\((.*)\)", path.read_text(encoding="utf-8"))
     assert sessions
     assert all('providers=["CPUExecutionProvider"]' in session for session in sessions), sessions
-    assert "\nbricks: []\n" in (APP / "app.yaml").read_text(encoding="utf-8")
+    ncnn = (ROOT / "models/paani_models/engines/ncnn_runner.py").read_text(encoding="utf-8")
+    assert re.findall(r"use_vulkan_compute = (.*)", ncnn) == ["False"]
+    assert re.findall(r"^bricks:.*", (APP / "app.yaml").read_text(encoding="utf-8"), re.M) == ["bricks: []"]
 
 
 def test_the_app_has_what_app_lab_looks_for() -> None:
     for name in ("app.yaml", "python/main.py", "python/requirements.txt", "sketch/sketch.ino", "sketch/sketch.yaml"):
         assert (APP / name).is_file(), name
-    assert "platform: arduino:zephyr" in (APP / "sketch/sketch.yaml").read_text(encoding="utf-8")
+    assert "platform: arduino:zephyr\n" in (APP / "sketch/sketch.yaml").read_text(encoding="utf-8")
 
 
 @pytest.mark.slow

@@ -76,6 +76,23 @@ def test_files_are_static_float32_opset_17_t1_c1_c4_d5(name: str) -> None:
         assert value.name == tensor.name
 
 
+@pytest.mark.parametrize("folder", [WEIGHTS, OPEN_WEIGHTS, PAPER_WEIGHTS], ids=["full", "open", "paper"])
+def test_the_segmenter_of_each_set_has_the_papers_contract_d5_d6_d7(folder: Path) -> None:
+    model, graph = load_catalogue(folder)["segmenter"], onnx.load(str(verified_path("segmenter", folder))).graph
+    for value in (*graph.input, *graph.output):
+        assert tuple(d.dim_value for d in value.type.tensor_type.shape.dim) == SHAPES["segmenter"][0]
+    assert (model.input.shape, model.output.shape) == SHAPES["segmenter"]
+    assert model.classes == ("water", "obstacle", "sky")
+    assert model.preprocessing.mean == (0.485, 0.456, 0.406)
+    assert model.preprocessing.std == (0.229, 0.224, 0.225)
+
+
+def test_the_training_normalises_as_the_board_does_d7() -> None:
+    picture = np.full((240, 320, 3), (200, 20, 10), np.uint8)
+    expected = [(200 / 255 - 0.485) / 0.229, (20 / 255 - 0.456) / 0.224, (10 / 255 - 0.406) / 0.225]
+    assert segmenter_input(picture)[0, :, 128, 160] == pytest.approx(expected, abs=1e-5)
+
+
 @pytest.mark.parametrize("name", SHAPES)
 def test_export_stays_within_tolerance_t2(name: str) -> None:
     assert 0.0 < load_catalogue()[name].export_max_abs_diff <= 1e-3

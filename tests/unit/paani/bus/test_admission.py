@@ -48,6 +48,7 @@ def raw(message: m.Message, **changes: object) -> bytes:
         (raw(thrust(), left=1.5), "out_of_range"),
         (raw(thrust(), left=-1.1), "out_of_range"),
         (raw(thrust(), domain=42), "wrong_domain"),
+        (raw(thrust(), domain=44), "wrong_domain"),
         (raw(thrust(), producer="advisor"), "wrong_producer"),
         (raw(thrust(), topic=""), "wrong_topic"),
         (raw(thrust(), topic=keys.ARMING.name), "wrong_topic"),

@@ -82,6 +82,15 @@ def test_n4_n5_heading_pd_and_its_limit() -> None:
     assert (hard.right - hard.left) / 2.0 == pytest.approx(0.04)
 
 
+@pytest.mark.parametrize("config", [PAPER, PAANI])
+def test_b12_thrust_is_normalised(config: ControllerConfig) -> None:
+    """B12: no fan is asked for more than its full force, whatever the limits of speed and steering add up to."""
+    changes = {"max_forward": 1.0, "max_steer": 1.0, "speed_kp": 9.0, "heading_kp": 9.0, "slew_per_s": 1.0}
+    strong = msgspec.structs.replace(config, **changes)
+    thrust = settle(strong, command(heading_rad=1.0, speed_mps=0.3), odometry(surge_mps=0.0))
+    assert (thrust.right, -config.astern <= thrust.left <= 1.0) == (1.0, True)
+
+
 def test_heading_error_goes_the_short_way_round() -> None:
     thrust = settle(PAPER, command(heading_rad=math.pi - 0.1), odometry(yaw_rad=-math.pi + 0.1))
     assert thrust.heading_error_rad == pytest.approx(-0.2)
@@ -145,13 +154,17 @@ def test_a_stop_is_zero_at_once_without_slew_limit() -> None:
         (command(), odometry(healthy=False), Inhibit.UNHEALTHY_ODOMETRY),
         (command(), odometry(surge_mps=math.nan), Inhibit.UNHEALTHY_ODOMETRY),
         (command(), odometry(yaw_rate_radps=math.nan), Inhibit.UNHEALTHY_ODOMETRY),
+        (command(), odometry(yaw_rad=math.nan), Inhibit.UNHEALTHY_ODOMETRY),
         (command(heading_rad=math.nan), odometry(), Inhibit.COMMAND_INVALID),
+        (command(heading_rad=math.inf), odometry(), Inhibit.COMMAND_INVALID),
         (command(speed_mps=math.inf), odometry(), Inhibit.COMMAND_INVALID),
         (command(speed_mps=-0.1), odometry(), Inhibit.COMMAND_INVALID),
         (command(frame="odom"), odometry(), Inhibit.COMMAND_INVALID),
+        (command(frame="base_link"), odometry(), Inhibit.COMMAND_INVALID),
         (command(enable=False), odometry(), Inhibit.COMMAND_INVALID),
         (command(inhibits=(Inhibit.NO_ROUTE,)), odometry(), Inhibit.COMMAND_INVALID),
         (command(domain=44), odometry(), Inhibit.WRONG_DOMAIN),
+        (command(domain=42), odometry(), Inhibit.WRONG_DOMAIN),
     ],
 )
 def test_b11_an_invalid_order_or_estimate_gives_zero_thrust(

@@ -52,6 +52,7 @@ def test_c5_non_finite_candidates_are_dropped() -> None:
     bad = [(*good[:i], value, *good[i + 1 :]) for i in range(8) for value in (math.nan, math.inf, -math.inf)]
     found = decode_boxes(output(good, *bad), SAME, RULES)
     assert [d.label for d in found] == [Label.VESSEL]
+    assert [decode_boxes(output(each), SAME, RULES) for each in bad] == [()] * len(bad), "each of them alone"
 
 
 @pytest.mark.parametrize(("score", "n"), [(0.40, 0), (0.4001, 1), (0.39, 0)])
@@ -117,6 +118,13 @@ def test_c10_a_scaled_picture_between_bars_at_its_sides_gives_fractions_of_itsel
     transform = LetterboxTransform(0.4, 0.4, 32, 8, 640, 600)
     found = decode_boxes(output((32 + 0.4 * 320, 8 + 0.4 * 150, 0.4 * 64, 0.4 * 120, 0.9, 0, 0, 0)), transform, RULES)
     assert [d.box_xyxy for d in found] == [pytest.approx((288 / 640, 90 / 600, 352 / 640, 210 / 600))]
+
+
+def test_c10_each_axis_has_its_own_scale() -> None:
+    """C10: both sides of a picture are rounded to pixels of the input, each for itself."""
+    transform = LetterboxTransform(0.5, 0.25, 0, 4, 200, 400)
+    found = decode_boxes(output((50, 54, 20, 20, 0.9, 0, 0, 0)), transform, RULES)
+    assert [d.box_xyxy for d in found] == [pytest.approx((80 / 200, 160 / 400, 120 / 200, 240 / 400))]
 
 
 def test_c11_scores_are_of_the_classes_by_their_names() -> None:

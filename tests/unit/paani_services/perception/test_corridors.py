@@ -19,6 +19,7 @@ from paani_services.perception.corridors import (
     overlap_fractions,
     summarise_corridors,
 )
+from paani_services.perception.pipeline import SEGMENTER_CLASSES
 
 HEIGHT, WIDTH = 64, 80
 ALL = np.ones((HEIGHT, WIDTH), np.float32)  # every cell visible
@@ -34,6 +35,22 @@ def test_e1_softmax() -> None:
     assert mask.max() == 0
     assert confidence == pytest.approx(math.e**2 / (math.e**2 + math.e + 1.0), abs=1e-6)
     assert classify_cells(logits, 2.0)[1] == pytest.approx(math.e / (math.e + math.e**0.5 + 1.0), abs=1e-6)
+
+
+@pytest.mark.parametrize("size_hw", [(256, 320), (64, 80), (32, 40)])
+@pytest.mark.parametrize("label", [WATER, OBSTACLE, SKY])
+def test_e1_each_class_may_be_the_label_whatever_the_size_of_the_output(size_hw: tuple[int, int], label: int) -> None:
+    """E1: the largest score is 2, the others are 1 and 0."""
+    logits = np.zeros((1, 3, *size_hw), np.float32)
+    logits[0, label], logits[0, (label + 1) % 3] = 2.0, 1.0
+    mask, confidence = classify_cells(logits, 1.0)
+    assert (mask == label).all()
+    assert confidence == pytest.approx(math.e**2 / (math.e**2 + math.e + 1.0), abs=1e-6)
+
+
+def test_d6_a_masks_numbers_are_the_places_of_the_classes() -> None:
+    assert SEGMENTER_CLASSES == ("water", "obstacle", "sky")
+    assert (WATER, OBSTACLE, SKY) == (0, 1, 2)
 
 
 @pytest.mark.slow
@@ -98,6 +115,25 @@ def test_e4_e5_e6_by_hand() -> None:
     assert lanes.center.uncertainty == pytest.approx(0.25, abs=1e-6)
     assert lanes.left.uncertainty == pytest.approx(0.1, abs=1e-6)
     assert (lanes.left.clear_width, lanes.center.clear_width, lanes.right.clear_width) == pytest.approx((1.0, 0.5, 0.0))
+
+
+@pytest.mark.parametrize("confidence", [0.34, 0.5, 0.97, 1.0])
+def test_e4_e5_labels_alone_make_water_and_every_confidence_counts_as_it_is(confidence: float) -> None:
+    """E4, E5: water that the network is hardly sure of is water."""
+    mask = np.zeros((HEIGHT, WIDTH), np.uint8)
+    mask[:, 40:] = OBSTACLE
+    lanes = summarise_corridors(mask, confidence * ALL, CorridorConfig())
+    assert [lane.non_water for lane in lanes] == pytest.approx([0.0, 0.5, 1.0])
+    assert [lane.uncertainty for lane in lanes] == pytest.approx([1.0 - confidence] * 3, abs=1e-6)
+
+
+def test_e4_e5_shares_are_of_the_pixels_that_are_water_or_not_and_no_own_hull() -> None:
+    """E4, E5: a quarter of each corridor's columns or fewer lie below the own hull, and count for nothing."""
+    mask, visible = np.zeros((HEIGHT, WIDTH), np.uint8), ALL.copy()
+    mask[:, 46:], visible[:, 34:40] = OBSTACLE, 0.0
+    center = summarise_corridors(mask, 0.8 * ALL, CorridorConfig(), visible).center
+    assert center.non_water == pytest.approx((55.2 - 46.0) / (30.4 - 6.0))
+    assert center.uncertainty == pytest.approx(0.2, abs=1e-6)
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -23,6 +23,7 @@ from paani.config.perception import WeightSet
 from paani.errors import UserError
 from paani_models.catalogue import OTHER_SETS, load_catalogue, verified_path
 from paani_services.perception.box_decoding import LABELS
+from paani_services.perception.corridors import summarise_corridors
 from paani_services.perception.engine import OnnxEngine, network_path
 from paani_services.perception.fitness import load_fitness
 from paani_services.perception.pipeline import Perceiver
@@ -136,6 +137,38 @@ def test_c15_the_threshold_is_one_setting_and_travels() -> None:
     config = load_config(sets=["perception.detections.confidence=0.25"]).perception
     evidence, _ = perceiver(config).perceive(river(), HEADER, 0.0)
     assert evidence.confidence_threshold == 0.25
+
+
+@pytest.mark.parametrize(("threshold", "found"), [(0.25, 1), (0.40, 0)])
+@pytest.mark.slow
+def test_c15_the_recorded_threshold_is_the_one_that_detections_pass(
+    monkeypatch: pytest.MonkeyPatch, threshold: float, found: int
+) -> None:
+    """C15: a person of 0.30 is one by the threshold of the paper's replay, and none by that of its board."""
+    monkeypatch.setattr(OnnxEngine, "run", seeing_somebody(0.30))
+    config = load_config(profile="paper", sets=[f"perception.detections.confidence={threshold}"]).perception
+    evidence, _ = perceiver(config).perceive(river(), HEADER, 0.0)
+    assert (len(evidence.detections), evidence.confidence_threshold) == (found, threshold)
+
+
+@pytest.mark.slow
+def test_b5_each_group_of_fields_has_its_own_content(monkeypatch: pytest.MonkeyPatch) -> None:
+    """B5: the detections, the lane that each summary is of, and the time that each network took."""
+    config = load_config(profile="paper").perception
+    eyes, picture = perceiver(config), river()
+    picture[:, :100] = (40, 60, 90)
+    monkeypatch.setattr(OnnxEngine, "run", seeing_somebody(0.6))
+    evidence, mask = eyes.perceive(picture, HEADER, 0.0)
+    assert mask is not None
+    lanes = summarise_corridors(mask, np.ones(mask.shape, np.float32), config.corridors)
+    stated = (evidence.left, evidence.center, evidence.right)
+    assert len({lane.non_water for lane in stated}) == 3
+    assert [lane.non_water for lane in stated] == pytest.approx([lane.non_water for lane in lanes])
+    assert [each.label for each in evidence.detections] == [m.Label.PERSON]
+    times = evidence.timing
+    assert len({times.detector_ms, times.segmenter_ms, times.gate_ms, times.decode_ms, times.inference_ms}) == 5
+    assert times.segmenter_run_ms <= times.segmenter_ms
+    assert times.detector_ms + times.segmenter_ms <= times.inference_ms
 
 
 @pytest.mark.slow

@@ -150,6 +150,13 @@ def test_a12_an_mpu6050_has_no_orientation_until_a_compass_gives_the_heading() -
     assert samples[-1].yaw_rad == pytest.approx(math.radians(100.0), abs=1e-6)
 
 
+def test_a12_a_receivers_course_gives_an_mpu6050_no_orientation() -> None:
+    """Nor does the variation of the place, with which a compass would have one."""
+    bench = Bench(SensorDevicesConfig(gps=GpsConfig(line=GPS), imu=ImuConfig(line=IMU), variation_deg=5.0))
+    assert bench.fixes(rmc("123510"))[0].fix
+    assert {sample.orientation_available for sample in bench.run_imu(0.2)} == {False}
+
+
 def test_the_orientation_becomes_unavailable_when_the_compass_falls_silent() -> None:
     bench = Bench()
     bench.suite.take(HEADING, sentence("GNHDT,90.0,T").encode(), bench.now_us)

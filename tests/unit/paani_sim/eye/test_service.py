@@ -7,6 +7,7 @@ import threading
 from collections.abc import Awaitable, Callable
 
 import cv2
+import msgspec
 import numpy as np
 import pytest
 
@@ -54,8 +55,8 @@ def gl() -> None:
 
 
 def test_pose_keeps_every_axis() -> None:
-    pose = boat_pose(truth(1))
-    assert (pose.x_m, pose.y_m, pose.z_m) == (20.0, 0.0, 0.177)
+    pose = boat_pose(msgspec.structs.replace(truth(1), y_m=-3.0))
+    assert (pose.x_m, pose.y_m, pose.z_m) == (20.0, -3.0, 0.177)
     assert (pose.roll_rad, pose.pitch_rad, pose.yaw_rad) == (0.02, -0.01, 0.4)
 
 
