@@ -66,6 +66,14 @@ def test_no_graph_but_hil_and_hull_has_a_publisher_to_motors() -> None:
     assert "thrusters" not in written(Graph.SIMULATION)
 
 
+@pytest.mark.parametrize("profile", ["paani", "paper"])
+def test_k10_a_simulation_starts_no_process_that_drives_motors(profile: str) -> None:
+    config = load_config(profile=profile)
+    assert config.bus.graph is Graph.SIMULATION
+    assert "plant" in config.services
+    assert not {"thrusters", "sensors"} & set(config.services)
+
+
 @pytest.mark.parametrize("graph", GRAPHS)
 def test_l4_truth_reaches_nobody_that_estimates_or_decides(graph: Graph) -> None:
     """L4: the router lets the eye, the page, the recorder and an observer hear it; no decider asks for it."""

@@ -65,6 +65,15 @@ def test_o2_zero_half_a_second_after_the_last_command() -> None:
     assert adapter.decide(later_us).zero_cause is ZeroCause.NONE
 
 
+def test_o2_a_refused_command_prolongs_nothing() -> None:
+    adapter = ready()
+    adapter.offer(thrust(), NOW_US)
+    adapter.offer(thrust(producer="advisor", seq=8), NOW_US + 300_000)
+    for after_us, right_n in ((500_000, 3.0), (500_001, 0.0)):
+        keep_alive(adapter, NOW_US + after_us)
+        assert adapter.decide(NOW_US + after_us).right_n == pytest.approx(right_n)
+
+
 @pytest.mark.parametrize("timeout", ["timeout_s", "arming_timeout_s", "pulse_timeout_s", "max_echo_age_s"])
 def test_a_timeout_ends_within_a_microsecond(timeout: str) -> None:
     long = dict.fromkeys(("timeout_s", "arming_timeout_s", "pulse_timeout_s", "max_echo_age_s"), 60.0)
@@ -105,11 +114,12 @@ def test_refused_commands_leave_the_one_in_force(changes: dict[str, object], cau
     assert adapter.decide(NOW_US + 600_000).zero_cause is cause
 
 
+@pytest.mark.parametrize("fan", ["left", "right"])
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, -0.11, 1.01])
-def test_invalid_thrust_stops_at_once(value: float) -> None:
+def test_invalid_thrust_stops_at_once(value: float, fan: str) -> None:
     adapter = ready()
     adapter.offer(thrust(), NOW_US)
-    assert adapter.offer(thrust(seq=8, left=value), NOW_US) is ZeroCause.INVALID
+    assert adapter.offer(thrust(seq=8, **{fan: value}), NOW_US) is ZeroCause.INVALID
     applied = adapter.decide(NOW_US)
     assert (applied.left_n, applied.right_n, applied.zero_cause) == (0.0, 0.0, ZeroCause.INVALID)
     adapter.offer(thrust(seq=9), NOW_US)

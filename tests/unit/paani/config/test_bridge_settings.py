@@ -29,6 +29,8 @@ def test_what_cannot_be_is_refused_with_its_field(setting: str) -> None:
 def test_the_loop_waits_for_no_bridge() -> None:
     """O5: the lights are no interlock. No thrust asks for the bridge's pulse, and no process reads what it writes."""
     assert "bridge" not in keys.VITAL_SERVICES
-    assert "bridge" not in load_config(sets=(LINE,)).plant.adapter.require_pulses
+    for profile in ("paani", "paper"):
+        config = load_config(profile=profile, sets=(LINE,))
+        assert "bridge" not in {*config.plant.adapter.require_pulses, *config.adapter.require_pulses}
     for service in keys.DECIDING_SERVICES:
         assert keys.BRIDGE_STATE not in decider_of(service).inputs

@@ -83,6 +83,7 @@ CONSTANTS: tuple[tuple[str, str, object], ...] = (
     ("M7", "navigator.turn_speed_frac", 0.5),
     ("M10", "navigator.advisory_max_age_s", 3.5),
     ("N1", "controller.rate_hz", 10.0),
+    ("N1", "navigator.rate_hz", 10.0),
     ("N2", "controller.max_speed_mps", 0.30),
     ("N3", "controller.speed_kp", 0.08),
     ("N3", "controller.speed_feed_forward", 0.16),

@@ -1,5 +1,6 @@
 """From heading and speed to thrust (N1-N8): order of operations, signs, limits, and the reasons for zero."""
 
+import itertools
 import math
 
 import msgspec
@@ -9,8 +10,13 @@ from hypothesis import strategies as st
 
 from paani.config import ControllerConfig, load_config
 from paani.geometry import wrap_rad
-from paani.messages import Direction, Inhibit, NavCommand, Odometry, Thrust
+from paani.messages import Direction, Inhibit, NavCommand, Odometry, Route, Thrust, Waypoint
+from paani.missions import mission_of_route
 from paani_services.controller.control import ControllerInputs, ControllerState, compute_thrust
+from paani_services.navigator.navigate import navigate
+from tests.unit.paani_services.navigator.test_navigate import NOW_US as GUIDANCE_US
+from tests.unit.paani_services.navigator.test_navigate import PAPER as PAPER_NAVIGATOR
+from tests.unit.paani_services.navigator.test_navigate import advice, at_waypoint, inputs, pose
 
 NOW_US = 9_000_000
 REST = ControllerState()
@@ -316,3 +322,47 @@ def test_n7_no_fan_is_asked_for_more_than_all_it_has() -> None:
     )
     thrust = settle(strong, command(heading_rad=2.0, speed_mps=0.30), odometry(surge_mps=0.30))
     assert (thrust.left, thrust.right) == (0.5, 1.0)
+
+
+def test_n8_slight_left_towards_waypoint_12_gives_the_recorded_thrust() -> None:
+    """N8: from the advice on, with the paper's turn, speed and gains."""
+    waypoints = tuple(Waypoint(x_m=10.0 * number, y_m=0.0) for number in range(20))
+    mission = mission_of_route(Route(source_us=0, name="line", waypoints=waypoints))
+    given_inputs = inputs(odometry=pose(115.0, 0.0), advisory=advice(Direction.SLIGHT_LEFT))
+    _, order = navigate(at_waypoint(12), given_inputs, mission, GUIDANCE_US, 43, PAPER_NAVIGATOR)
+    assert (order.enable, order.waypoint_index, order.direction) == (True, 12, Direction.SLIGHT_LEFT)
+    thrust = settle(PAPER, order, odometry(surge_mps=0.0732))
+    assert (f"{thrust.left:.5f} {thrust.right:.5f}", thrust.enabled) == ("0.00000 0.02611", True)
+
+
+@pytest.mark.parametrize(("ordered_mps", "target_mps"), [(0.29, 0.29), (0.30, 0.30), (0.31, 0.30), (5.0, 0.30)])
+def test_n2_no_order_asks_for_more_than_0_30_mps_ahead_or_astern(ordered_mps: float, target_mps: float) -> None:
+    for stopped in (False, True):
+        at_rest = odometry(surge_mps=0.0, stopped=stopped)
+        ahead = settle(PAPER, command(speed_mps=ordered_mps), at_rest)
+        astern = settle(PAPER, command(speed_mps=0.0, astern_mps=ordered_mps), at_rest)
+        assert (ahead.speed_error_mps, astern.speed_error_mps) == pytest.approx((target_mps, -target_mps))
+
+
+@pytest.mark.parametrize("period_us", [20_000, 50_000, 100_000])
+def test_n6_no_fan_changes_faster_however_often_orders_come(period_us: int) -> None:
+    """N6: from the first step on, which counts as one at 10 Hz."""
+    state, fans = REST, [(0.0, 0.0)]
+    for number in range(30):
+        now_us, heading_rad = NOW_US + number * period_us, 2.0 if number < 15 else -2.0
+        order = command(heading_rad=heading_rad, speed_mps=0.30)
+        given_inputs = ControllerInputs(order, now_us, odometry(surge_mps=0.0), now_us)
+        state, thrust = compute_thrust(state, given_inputs, now_us, 43, PAPER)
+        fans.append((thrust.left, thrust.right))
+    changes = [max(abs(b - a) for a, b in zip(*pair, strict=True)) for pair in itertools.pairwise(fans)]
+    assert changes[0] <= 0.015 + 1e-9
+    assert max(changes[1:]) == pytest.approx(0.15 * period_us * 1e-6)
+
+
+@pytest.mark.parametrize("config", [PAPER, PAANI])
+def test_l5_a_stopped_boat_that_is_ordered_ahead_is_driven_as_one_at_rest(config: ControllerConfig) -> None:
+    """L5: the guard holds for hardly any order ahead; under a larger one its speed still counts as none."""
+    order = command(speed_mps=0.05)
+    at_rest, *noisy = (settle(config, order, odometry(surge_mps=v, stopped=True)) for v in (0.0, -0.04, 0.04))
+    assert at_rest.left == at_rest.right > 0.0
+    assert [(each.left, each.right) for each in noisy] == [(at_rest.left, at_rest.right)] * 2

@@ -7,7 +7,7 @@ import math
 import msgspec
 import pytest
 
-from paani.config import load_config
+from paani.config import LocalizationConfig, load_config
 from paani.messages import ImuSample
 from paani_services.localization.choice import create_estimator
 from paani_services.localization.estimator import Estimator
@@ -165,3 +165,14 @@ def test_an_imu_that_restarts_or_a_clock_set_back_starts_everything_anew(boat: E
     boat.sail(1.0)
     assert boat.global_estimate.healthy
     assert boat.global_estimate.x_m == pytest.approx(-200.0, abs=1.5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("config", [PLAIN, CONFIG], ids=["plain", "augmented"])
+def test_l1_the_local_speed_is_what_the_accelerometer_adds_up_to(config: LocalizationConfig) -> None:
+    boat = EstimatedBoat(config)
+    boat.gps = False
+    boat.sail(4.0)
+    boat.sail(1.0, surge_mps=0.5)
+    assert boat.local_estimate.surge_mps == pytest.approx(0.5, abs=0.15)
+    assert boat.local_estimate.sway_mps == pytest.approx(0.0, abs=0.05)

@@ -125,12 +125,13 @@ def test_line_of_sight_steers_back_onto_the_leg() -> None:
         (Direction.SLIGHT_RIGHT, -10.0),
     ],
 )
+@pytest.mark.parametrize("yaw_rad", [3.1, 0.3, -0.3, -2.0])
 @pytest.mark.parametrize("config", [PAPER, PAANI])
-def test_m5_m6_m7_visual_turns(config: NavigatorConfig, direction: Direction, turn_deg: float) -> None:
+def test_m5_m6_m7_visual_turns(config: NavigatorConfig, yaw_rad: float, direction: Direction, turn_deg: float) -> None:
     """M5, M6: current yaw +/- 25 or 10 deg; M7: half of cruise, in slight turns too."""
-    at = pose(3.0, 0.0, yaw_rad=3.1)
+    at = pose(3.0, 0.0, yaw_rad)
     _, order = run(config, inputs(odometry=at, advisory=advice(direction)))
-    wanted = 3.1 + math.radians(turn_deg)
+    wanted = yaw_rad + math.radians(turn_deg)
     assert math.cos(order.heading_rad - wanted) == pytest.approx(1.0)
     assert -math.pi <= order.heading_rad < math.pi
     assert order.speed_mps == pytest.approx(0.5 * config.cruise_mps)
@@ -143,15 +144,16 @@ def test_m5_paper_turns_are_continuous() -> None:
         yaw_rad = 0.1 * step
         order = run_10_hz.order(Direction.LEFT, pose(3.0, 0.0, yaw_rad))
         assert math.cos(order.heading_rad - yaw_rad) == pytest.approx(math.cos(math.radians(25.0)))
-        assert order.enable
+        assert (order.enable, order.speed_mps) == (True, 0.075)
 
 
 def test_latched_turns_keep_their_heading() -> None:
-    """The ordered heading stays while the boat turns towards it."""
+    """M5, M7: the ordered heading stays while the boat turns towards it, at half of cruise throughout."""
     run_10_hz = GuidanceRun(PAANI)
     for step in range(4):
         order = run_10_hz.order(Direction.LEFT, pose(3.0, 0.0, yaw_rad=0.08 * step))
         assert order.heading_rad == pytest.approx(math.radians(25.0))
+        assert order.speed_mps == pytest.approx(0.5 * PAANI.cruise_mps)
 
 
 def test_latched_turns_add_the_next_turn_only_after_holding_the_first() -> None:
@@ -220,10 +222,20 @@ def test_m2_acceptance_radius_and_m3_repeat() -> None:
     assert (order.waypoint_index, order.waypoints_reached) == (3, 2)
     order = run_10_hz.order(Direction.STRAIGHT, pose(0.5, 10.0))
     assert (order.waypoint_index, order.waypoints_reached) == (0, 3)
-    for reached, (x_m, y_m) in enumerate(2 * [(0.2, 0.2), (9.8, 0.2), (9.8, 9.8), (0.2, 9.8)], start=4):
+    for reached, (x_m, y_m) in enumerate(20 * [(0.2, 0.2), (9.8, 0.2), (9.8, 9.8), (0.2, 9.8)], start=4):
         order = run_10_hz.order(Direction.STRAIGHT, pose(x_m, y_m))
         assert (order.enable, order.inhibits) == (True, ())
         assert (order.waypoint_index, order.waypoints_reached) == ((reached + 1) % 4, reached)
+
+
+@pytest.mark.parametrize(("distance_m", "waypoint_index"), [(0.99, 2), (1.01, 1)])
+@pytest.mark.parametrize("bearing_deg", range(0, 360, 45))
+def test_m2_a_waypoint_is_reached_within_1_m_on_whatever_side(
+    bearing_deg: int, distance_m: float, waypoint_index: int
+) -> None:
+    bearing_rad = math.radians(bearing_deg)
+    at = pose(10.0 + distance_m * math.cos(bearing_rad), distance_m * math.sin(bearing_rad))
+    assert GuidanceRun(PAPER).order(Direction.STRAIGHT, at).waypoint_index == waypoint_index
 
 
 def test_m1_the_target_waypoint_is_kept_during_visual_turns() -> None:

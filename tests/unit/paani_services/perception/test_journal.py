@@ -9,6 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from paani.logs.folder import NAME as RECORDING
+from paani.runtime import LOGS
 from paani_services.perception.journal import JOURNAL_FOLDER, NEWER_FILE, OLDER_FILE, Journal
 
 
@@ -64,7 +65,7 @@ def test_a_failing_disk_loses_lines_and_nothing_else(tmp_path: Path) -> None:
 
 def test_journal_files_are_named_unlike_any_other() -> None:
     """P5: journal, process logs, recordings and exported tables are not confused."""
-    assert JOURNAL_FOLDER not in {"logs", "credentials"}
+    assert JOURNAL_FOLDER not in {LOGS, "logs", "credentials"}
     for name in (NEWER_FILE, OLDER_FILE):
         assert not RECORDING.fullmatch(name)
         assert not name.endswith((".log", ".csv", ".mcap"))

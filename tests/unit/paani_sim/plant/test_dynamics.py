@@ -46,6 +46,9 @@ def test_k5_drag_follows_the_body_axes() -> None:
         (0.177, 0.0, WEIGHT_N),
         (0.157, 0.0, WEIGHT_N + 13.0),
         (0.177, 0.1, WEIGHT_N - 9.0),
+        (0.177, 1.0, WEIGHT_N - 90.0),
+        (0.177, -1.0, WEIGHT_N + 90.0),
+        (0.217, -0.5, WEIGHT_N - 26.0 + 45.0),
         (0.6, 0.0, 0.0),  # out of the water
         (-1.0, 0.0, 3.0 * WEIGHT_N),  # deep under: F_max
     ],
@@ -100,3 +103,18 @@ def test_k8_wind_and_waves_do_nothing_to_the_papers_hull() -> None:
 @pytest.mark.parametrize("angle_rad", [0.1, -0.3])
 def test_k7_the_stiffness_is_the_same_at_every_angle(axis: int, angle_rad: float) -> None:
     assert compute_wrench(turned(angle_rad, axis), IDLE, PAPER)[3 + axis] == pytest.approx(-90.0 * angle_rad)
+
+
+@pytest.mark.parametrize("speed", [-3.0, -0.5, -0.1, 0.1, 0.5, 3.0])
+def test_k5_drag_opposes_motion_to_either_side_at_every_speed(speed: float) -> None:
+    surge, sway, yaw = (
+        compute_wrench(state, IDLE, PAPER)
+        for state in (
+            AFLOAT._replace(vx_mps=speed),
+            AFLOAT._replace(vy_mps=speed),
+            AFLOAT._replace(yaw_rate_radps=speed),
+        )
+    )
+    assert surge[0] == pytest.approx(-(4.0 + 20.0 * abs(speed)) * speed)
+    assert sway[1] == pytest.approx(-(20.0 + 80.0 * abs(speed)) * speed)
+    assert yaw[5] == pytest.approx(-(4.0 + 25.0 * abs(speed)) * speed)

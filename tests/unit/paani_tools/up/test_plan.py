@@ -75,10 +75,11 @@ async def test_own_route_and_origin_are_kept(private_sets: tuple[str, ...], tmp_
     assert plan.config.localization.origin_lat_lon_deg == (10.0, 20.0)
 
 
-async def test_p4_a_start_runs_no_survey_benchmark_or_recorder(private_sets: tuple[str, ...]) -> None:
+@pytest.mark.parametrize("profile", ["paani", "paper"])
+async def test_p4_a_start_runs_no_survey_benchmark_or_recorder(profile: str, private_sets: tuple[str, ...]) -> None:
     """P4: they are commands, or run only when asked for."""
     commands = {point.name for point in entry_points(group="paani.commands")}
-    plan = await make_plan(load_config(sets=private_sets))
+    plan = await make_plan(load_config(profile=profile, sets=private_sets))
     assert {"bench", "scenario", "logs"} <= commands
     assert not commands & set(plan.services)
     assert "recorder" not in plan.services

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from paani.config import PlannerConfig, load_config
+from paani.messages import Constraint
 from paani_services.navigator.avoidance.clearance import (
     APPROACH_S,
     UNSEEN_GROWTH_MPS,
@@ -14,7 +17,10 @@ from paani_services.navigator.avoidance.clearance import (
     closest_point_of_approach,
     predict_clearances,
     predicted_clearance_m,
+    separation_margin_m,
 )
+from paani_services.navigator.avoidance.constraints import check_margins, hard_constraints
+from paani_services.navigator.avoidance.evaluation import evaluate_candidates
 from paani_services.navigator.avoidance.rollout import (
     BoatState,
     GuidanceSetpoint,
@@ -24,8 +30,12 @@ from paani_services.navigator.avoidance.rollout import (
     with_coasting_and_resting,
 )
 from paani_services.navigator.mapping.dynamic_obstacles import DynamicObstacle
+from paani_services.navigator.mapping.observed_cells import CELL_M
+from paani_services.navigator.mapping.occupancy_grid import GRID_CELLS, OccupancyGrid
 from paani_services.navigator.mapping.velocity_fit import Velocity
-from tests.synthetic_water import PLANNER
+from tests.synthetic_water import PLANNER, request_on
+
+PAPER = load_config(profile="paper").navigator.planner
 
 
 @settings(max_examples=20, deadline=None)
@@ -89,3 +99,32 @@ def test_the_closest_point_is_that_of_two_that_sail_on(
     assert found.now_m == pytest.approx(gap_m[0])
     assert found.cpa_m == pytest.approx(gap_m.min(), abs=0.05)
     assert found.cpa_m <= gap_m.min() + 1e-6
+
+
+@pytest.mark.parametrize("config", [PAPER, PLANNER], ids=["paper", "paani"])
+@pytest.mark.parametrize("obstacle_m", [(0.6, 0.9), (0.6, -0.9), (2.1, 0.9), (2.1, -0.9)])
+def test_q4_q6_a_candidate_is_refused_where_the_hull_comes_too_near_at_any_step_of_3_s(
+    obstacle_m: tuple[float, float], config: PlannerConfig
+) -> None:
+    """On the way as at its end, with the drift of that time; a boat that is nearer already comes no nearer."""
+    cells, none = np.zeros((GRID_CELLS, GRID_CELLS), np.bool_), np.zeros((GRID_CELLS, GRID_CELLS), np.bool_)
+    column, row = (int((each_m + 10.0) / CELL_M) for each_m in obstacle_m)
+    cells[row, column] = True
+    grid = OccupancyGrid(-10.0, -10.0, cells, none, ~cells, none, none, none, none)
+    within = msgspec.structs.replace(config, room_m=0.0)
+    start, setpoint = BoatState(0.0, 0.0, 0.0, config.speed_mps), GuidanceSetpoint(0.0, config.speed_mps)
+    evaluation = evaluate_candidates(request_on(grid, start, setpoint, None, within))
+    refused = check_margins(evaluation, hard_constraints(evaluation)).refusals[Constraint.STATIC_OBSTACLE]
+    time_s, clearance_m = 0.2 * np.arange(16)[:, None], evaluation.static_clearance_m[:16]
+    needed_m = np.minimum(0.55 + config.margin_m + 0.15 * time_s, clearance_m[0, 0] - 0.5 * CELL_M)
+    assert np.array_equal(refused, (clearance_m < needed_m).any(axis=0))
+    assert 0 < refused.sum() < refused.size
+
+
+@pytest.mark.parametrize(("config", "margin_m"), [(PAPER, 0.25), (PLANNER, 0.7)], ids=["paper", "paani"])
+def test_q6_what_moves_is_kept_as_clear_of(config: PlannerConfig, margin_m: float) -> None:
+    time_s = np.array([0.0, 1.0, 2.0, 3.0])
+    for resting_m, required_m in ((9.0, 0.55 + margin_m + 0.15 * time_s), (0.6, np.full(4, 0.5))):
+        clearance = DynamicClearance(np.full((1, 4, 2), 3.0), np.full((1, 4), 3.0), np.full((1, 4), resting_m))
+        for kept_m in separation_margin_m(clearance, time_s, config)[0].T:
+            assert kept_m == pytest.approx(3.0 - required_m)
