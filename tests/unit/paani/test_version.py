@@ -46,6 +46,7 @@ def test_no_commit_is_taken_from_a_repository_further_up(tmp_path: Path) -> None
     assert commit(tmp_path / "below", tmp_path / "below") == UNKNOWN
 
 
+@pytest.mark.slow
 def test_the_command_tells_release_and_commit(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--version"]) == 0
     assert capsys.readouterr().out == f"paani 0.1.0 (commit {commit()})\n"

@@ -181,6 +181,7 @@ def candidates(scale: float, score: float) -> np.ndarray:
         (candidates(200.0, 3.0), "are no probabilities"),
     ],
 )
+@pytest.mark.slow
 def test_outputs_that_are_not_of_the_contract(
     answer: np.ndarray, named: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -240,6 +241,7 @@ def detector_of(folder: Path, classes: tuple[str, ...], candidate_count: int = 2
     return path
 
 
+@pytest.mark.slow
 def test_what_differs_in_a_detector_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = detector_of(tmp_path, ("buoy", "-", "vessel"), 2100)
     assert main(["models", "check", str(path)]) == 0

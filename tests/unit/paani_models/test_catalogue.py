@@ -126,6 +126,7 @@ def test_an_unknown_model_is_named() -> None:
         verified_path("radar")
 
 
+@pytest.mark.slow
 def test_check_command_needs_no_torch(capsys: pytest.CaptureFixture[str], copied: Path) -> None:
     assert main(["check"]) == 0
     assert "open segmenter: segmenter.onnx" in capsys.readouterr().out

@@ -36,6 +36,7 @@ def test_the_official_reader_reads_it_back_to_the_byte(tmp_path: Path) -> None:
         assert sum(1 for _ in StreamReader(file, validate_crcs=True).records) > 60
 
 
+@pytest.mark.slow
 def test_it_says_what_made_it(tmp_path: Path) -> None:
     path = finished(tmp_path)
     with path.open("rb") as file:
@@ -52,6 +53,7 @@ def test_it_says_what_made_it(tmp_path: Path) -> None:
     assert noted["recorder"]["localization/odometry"].startswith("written=60")
 
 
+@pytest.mark.slow
 def test_every_row_of_the_table_has_a_channel(tmp_path: Path) -> None:
     with finished(tmp_path).open("rb") as file:
         summary = make_reader(file).get_summary()

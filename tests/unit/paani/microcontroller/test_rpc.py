@@ -187,6 +187,7 @@ VALUES = st.recursive(
 
 
 @given(VALUES, st.binary(max_size=20))
+@pytest.mark.slow
 def test_the_end_of_every_value_is_found(value: object, behind: bytes) -> None:
     data = msgspec.msgpack.encode(value)
     if len(data) > MAX_MESSAGE_BYTES or depth(value) > 3:

@@ -171,6 +171,7 @@ def test_other_releases_of_onnxruntime_run(release: str) -> None:
     check_onnxruntime(release)
 
 
+@pytest.mark.slow
 def test_convert_writes_what_the_engine_runs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     source, out = small_segmenter(tmp_path / "own.onnx"), tmp_path / "out"
     words = ["convert", str(source), "--pnnx", str(program(tmp_path)), "--out", str(out), "--data", "no/such/folder"]

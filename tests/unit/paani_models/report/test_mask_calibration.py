@@ -60,6 +60,7 @@ def test_counts_are_those_of_a_picture_by_hand() -> None:
     assert count_cells(large, np.zeros((480, 640), np.uint8)).bins[0, :, 0].sum() == 64 * 80
 
 
+@pytest.mark.slow
 def test_z1_the_error_before_and_after_is_told_in_this_order() -> None:
     cells = [count_cells(*picture(seed)) for seed in range(2)]
     found = calibrate(np.array([each.loss for each in cells]), np.array([each.bins for each in cells]), pictures=2)

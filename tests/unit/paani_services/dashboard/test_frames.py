@@ -11,6 +11,7 @@ from paani_services.dashboard.frames import FrameHeader, decode_frame, encode_fr
 
 
 @given(key=st.text(max_size=40), age_ms=st.integers(0, 10**9), body=st.binary(max_size=200))
+@pytest.mark.slow
 def test_a_frame_survives(key: str, age_ms: int, body: bytes) -> None:
     got_key, header, got_body = decode_frame(encode_frame(key, FrameHeader(age_ms=age_ms), body))
     assert (got_key, header.age_ms, got_body) == (key, age_ms, body)

@@ -92,6 +92,7 @@ def test_a_new_imu_epoch_starts_anew(boat: EstimatedBoat) -> None:
     assert boat.global_estimate.x_m == pytest.approx(-200.0, abs=1.0)
 
 
+@pytest.mark.slow
 def test_a_single_outlier_fix_is_refused(boat: EstimatedBoat) -> None:
     boat.fix_offset_m = 40.0
     boat.sail(0.2)
@@ -132,6 +133,7 @@ def test_gyro_bias_is_estimated_at_rest(boat: EstimatedBoat) -> None:
 
 
 @pytest.mark.parametrize(("roll_rad", "pitch_rad"), [(0.05, 0.0), (0.0, 0.05), (-0.04, 0.06)])
+@pytest.mark.slow
 def test_tilt_is_not_taken_for_acceleration(boat: EstimatedBoat, roll_rad: float, pitch_rad: float) -> None:
     """A boat at rest that heels or trims measures gravity along its axes, and is estimated at rest."""
     for _ in range(40):

@@ -157,6 +157,7 @@ def test_what_is_not_a_number_is_dropped_and_counted(boat: EstimatedBoat) -> Non
 
 
 @pytest.mark.parametrize("epoch", [0, 1])
+@pytest.mark.slow
 def test_an_imu_that_restarts_or_a_clock_set_back_starts_everything_anew(boat: EstimatedBoat, epoch: int) -> None:
     boat.epoch, boat.x_m = epoch, -200.0
     if epoch == 0:

@@ -14,6 +14,7 @@ from tests.unit.paani.logs.small_logs import NAME, START_US, begin, fill, finish
 LATER = "20231114T221330Z-2.mcap"
 
 
+@pytest.mark.slow
 def test_the_recordings_of_the_folder_but_the_one_that_is_written(tmp_path: Path) -> None:
     written = finished(tmp_path)
     (tmp_path / "notes.mcap").write_bytes(b"not a recording of ours")

@@ -55,6 +55,7 @@ def test_a_pose_in_the_frames_of_the_protocol() -> None:
 
 
 @given(st.floats(-3.1, 3.1), st.floats(-0.7, 0.7), st.floats(-0.7, 0.7))
+@pytest.mark.slow
 def test_quaternion_and_angles_agree(yaw_rad: float, pitch_rad: float, roll_rad: float) -> None:
     """By the rotation matrix: where the bow and the mast point."""
     found = sent(in_order(odometry=odometry(yaw_rad=yaw_rad, pitch_rad=pitch_rad, roll_rad=roll_rad)))

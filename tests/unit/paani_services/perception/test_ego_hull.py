@@ -39,6 +39,7 @@ def test_the_own_hull_is_no_obstacle() -> None:
     st.floats(-0.35, 0.35),
     st.integers(0, 2**32 - 1),
 )
+@pytest.mark.slow
 def test_hidden_cells_never_count_as_water(corners: list[tuple[float, float]], roll_rad: float, seed: int) -> None:
     """An obstacle all over stays blocked in every corridor, whatever polygon and roll: nothing becomes free."""
     mask = np.full((HEIGHT, WIDTH), np.random.default_rng(seed).choice([OBSTACLE, SKY]), np.uint8)

@@ -65,6 +65,7 @@ def counted(recording: Recording) -> tuple[int, int]:
     return topic.written, topic.dropped
 
 
+@pytest.mark.slow
 def test_parts_follow_one_another_without_a_gap(tmp_path: Path) -> None:
     recording = Recording(settings(tmp_path, part_s=2.0), describe_system(Config()), TOPICS)
     record(recording, range(100))
@@ -110,6 +111,7 @@ def test_a_crash_loses_at_most_what_was_not_flushed(tmp_path: Path) -> None:
     recording.close([], now_us(95))
 
 
+@pytest.mark.slow
 def test_a_clock_set_back_begins_a_part_that_is_flushed(tmp_path: Path) -> None:
     """What is heard after it is in a file of its own, in order of time, and on the disk within `flush_s`."""
     recording = Recording(settings(tmp_path, flush_s=0.5, part_s=3600.0), describe_system(Config()), TOPICS)
@@ -164,6 +166,7 @@ def test_no_recorder_deletes_what_another_is_writing(tmp_path: Path) -> None:
         recording.close([], now_us(800))
 
 
+@pytest.mark.slow
 def test_kept_recordings_that_fill_the_budget_end_the_recording(tmp_path: Path) -> None:
     size = finished(tmp_path, name="20200101T000000Z-1.mcap").stat().st_size
     (tmp_path / "20200101T000000Z-1.mcap.keep").touch()
@@ -222,6 +225,7 @@ def test_a_write_that_fails_is_counted_and_tried_again(tmp_path: Path) -> None:
     assert kept == sorted(set(kept))
 
 
+@pytest.mark.slow
 def test_a_folder_that_disappears_pauses_the_recording(tmp_path: Path) -> None:
     folder = tmp_path / "r"
     folder.mkdir()

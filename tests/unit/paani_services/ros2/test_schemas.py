@@ -65,6 +65,7 @@ def test_what_is_no_message_is_refused(data: bytes, kind: str) -> None:
 
 
 @given(st.sampled_from(sorted({topic.type for topic in (*topics.SENT, *topics.COMMANDS)})), st.binary(max_size=200))
+@pytest.mark.slow
 def test_bytes_of_anybody_are_a_message_or_refused(kind: str, data: bytes) -> None:
     for payload in (data, b"\x00\x01\x00\x00" + data):
         with contextlib.suppress(ValueError):

@@ -136,6 +136,7 @@ def test_a_crowd_is_bounded_and_its_newest_are_told() -> None:
 
 
 @given(st.lists(st.text(st.characters(codec="ascii", exclude_characters="\r\n"), max_size=80), max_size=30))
+@pytest.mark.slow
 def test_any_payload_is_survived_and_little_is_kept(payloads: list[str]) -> None:
     receiver = Receiver()
     for number, payload in enumerate(payloads):

@@ -19,6 +19,7 @@ def test_jitter_of_the_line_is_taken_out() -> None:
     )
 
 
+@pytest.mark.slow
 def test_two_clocks_may_drift_apart() -> None:
     clock = ReceiptClock()
     for step in range(36_000):

@@ -307,6 +307,7 @@ def test_a_line_that_is_opened_again_begins_anew() -> None:
     assert bench.device(SensorRole.GPS).status is SensorStatus.OK
 
 
+@pytest.mark.slow
 def test_a_unit_that_was_pulled_out_and_began_anew_is_not_late() -> None:
     """Its own clock began with it, and may be ahead of where it stood when it was pulled out."""
     bench = Bench()
@@ -370,6 +371,7 @@ KINDS = [
 
 @settings(deadline=None)  # the first example compiles patterns and fills caches
 @given(st.lists(st.tuples(st.sampled_from(KINDS), BODIES), max_size=6))
+@pytest.mark.slow
 def test_any_sentence_with_a_good_checksum_is_survived(bodies: list[tuple[str, str]]) -> None:
     bench = Bench(
         SensorDevicesConfig(gps=GpsConfig(line=GPS), imu=ImuConfig(line=GPS), heading=HeadingConfig(line=GPS))

@@ -49,6 +49,7 @@ SIDE = st.one_of(st.floats(-1.0, 1.0), st.sampled_from([-1.0, -0.3, 0.0, 0.004, 
 @example(left=0.5, right=-0.1, ahead=CALIBRATED, starboard=CALIBRATED, most=1.0)
 @example(left=1.0, right=0.1, ahead=AS_SHIPPED, starboard=AS_SHIPPED, most=0.3)
 @given(left=SIDE, right=SIDE, ahead=CHANNELS, starboard=CHANNELS, most=st.floats(0.3, 1.0))
+@pytest.mark.slow
 def test_no_side_gets_more_than_was_decided(
     left: float, right: float, ahead: Channel, starboard: Channel, most: float
 ) -> None:

@@ -12,6 +12,7 @@ PARAPET_M = 0.95
 
 
 @pytest.mark.parametrize("world", ["canal", "river"])
+@pytest.mark.slow
 def test_both_ends_of_the_road_are_in_the_ground(world: str) -> None:
     """Where the road ends it lies below the bank; before, no part of it hangs in the air."""
     [thing] = [o for o in load_world(world).obstacles if o.look == "bridge"]

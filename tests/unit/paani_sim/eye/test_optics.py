@@ -39,6 +39,7 @@ def test_no_distortion_is_a_pinhole() -> None:
     assert np.array_equal(Optics(camera, 1.0).picture(GREY), GREY)
 
 
+@pytest.mark.slow
 def test_barrel_draws_wider_and_leaves_no_border() -> None:
     optics = Optics(Camera(k1=-0.15), 1.0)
     assert optics.pinhole.hfov_deg > 72.0

@@ -71,6 +71,7 @@ def test_what_is_out_of_range_or_lower_than_the_beams_is_not_met(
     assert any(afloat(wall(6.0, HEIGHT_M + 0.05)).read_lidar())
 
 
+@pytest.mark.slow
 def test_errors_are_as_large_as_stated_and_new_in_each_turn(afloat: OpenPlant) -> None:
     plant = afloat(wall(6.0))
     errors_m = [plant.read_lidar()[AHEAD_BEAM] - 6.0 for _ in range(400)]
@@ -86,6 +87,7 @@ def test_a_vessel_is_met_where_it_is_by_now(afloat: OpenPlant) -> None:
     assert plant.read_lidar()[AHEAD_BEAM] == pytest.approx(10.0 - 2.0 - 2.0, abs=0.3)
 
 
+@pytest.mark.slow
 def test_equal_seeds_measure_alike_and_no_other_sensor_notices(afloat: OpenPlant) -> None:
     one, other, without = afloat(wall(6.0)), afloat(wall(6.0)), afloat(wall(6.0))
     another = afloat(wall(6.0), seed=2)

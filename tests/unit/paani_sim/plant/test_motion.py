@@ -69,6 +69,7 @@ def test_k4_k5_thrust_gives_the_drag_limited_speed(open_plant: OpenPlant, thrust
     assert over_ground_mps == pytest.approx(speed_mps, rel=0.02)
 
 
+@pytest.mark.slow
 def test_k4_two_fans_turn_the_boat_away_from_the_stronger(open_plant: OpenPlant) -> None:
     """Forward 0.08 and steering 0.04: 1.8 N m against 4 r + 25 r^2 is 0.200 rad/s, to port."""
     plant = open_plant()

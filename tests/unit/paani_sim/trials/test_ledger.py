@@ -121,6 +121,7 @@ def test_only_what_is_checked_out_is_measured(tmp_path: Path, git: Git) -> None:
         resolve_commit(root, git("rev-parse", "HEAD@{1}"), ledger)
 
 
+@pytest.mark.slow
 def test_a_tree_that_was_changed_is_refused_by_name(tmp_path: Path, git: Git) -> None:
     root = tmp_path / "checkout"
     ledger = root / "own.jsonl"

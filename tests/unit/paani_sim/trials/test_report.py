@@ -56,6 +56,7 @@ def test_a_plan_is_well_formed_and_shows_the_track(world: str) -> None:
     assert 0.0 < min(numbers) < max(numbers) < 520.0
 
 
+@pytest.mark.slow
 def test_the_page_stands_alone() -> None:
     """Names are escaped, nothing is fetched, and the recording is linked."""
     results = {CASES[0]: touched(RESULT), CASES[1]: RESULT, TrialCase("lake", 1, Policy.BLIND): RESULT}

@@ -44,6 +44,7 @@ def test_fresh_seeds_are_the_published_function_of_the_commit() -> None:
     ]
 
 
+@pytest.mark.slow
 def test_a_fresh_seed_draws_a_world() -> None:
     seed = draw_fresh_seeds("1" * 40, 1)[0]
     assert load_scenario(f"random:lake:{seed}").seed == seed

@@ -25,6 +25,7 @@ COORDINATES = st.floats(-3.0, 4.0)
 
 
 @given(st.lists(st.tuples(COORDINATES, COORDINATES), min_size=3, max_size=12))
+@pytest.mark.slow
 def test_the_bounds_are_those_of_the_part_within_the_picture(corners: list[tuple[float, float]]) -> None:
     """Every point between two corners that the picture shows is within them."""
     points = np.array(corners)

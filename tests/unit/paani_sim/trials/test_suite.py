@@ -126,6 +126,7 @@ def test_settings_and_scenario_files_are_part_of_what_made_a_result(tmp_path: Pa
         assert made.list_differences(again) == [name]
 
 
+@pytest.mark.slow
 def test_a_result_names_the_machine_that_made_it_and_files_of_one_name_have_results_of_their_own(
     tmp_path: Path, reader: FingerprintReader
 ) -> None:

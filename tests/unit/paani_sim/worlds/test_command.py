@@ -22,6 +22,7 @@ def test_list_names_every_world_and_scenario(capsys: pytest.CaptureFixture[str])
     assert [line.split()[0] for line in lines[1:-1]] == [*WORLDS, *SCENARIOS]
 
 
+@pytest.mark.slow
 def test_check_says_which_files_are_sound(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     good, bad = tmp_path / "good.toml", tmp_path / "bad.toml"
     good.write_text('[world]\nkind = "lake"\n')
@@ -80,6 +81,7 @@ def test_impossible_numbers_are_refused(option: str, tmp_path: Path, capsys: pyt
 
 
 @pytest.mark.parametrize("name", ["lake", "harbour_crossing"])
+@pytest.mark.slow
 def test_the_plan_shows_water_land_route_and_things(name: str) -> None:
     scenario = load_scenario(name)
     plan = draw_plan_view(scenario, 600, 400)

@@ -135,6 +135,7 @@ def test_what_an_older_folder_lacks_is_told_and_made_without_changing_the_others
 
 
 @HULL
+@pytest.mark.slow
 def test_nothing_is_made_where_the_authority_has_no_key(folder: Path) -> None:
     forget(folder, "button")
     (folder / "authority.1.key").unlink()

@@ -36,6 +36,7 @@ def test_bash_completes_commands_options_and_choices() -> None:
     assert complete("run", "percep") == {"perception"}
 
 
+@pytest.mark.slow
 def test_bash_completes_sub_commands() -> None:
     assert {"info", "mend"} & complete("logs", "")
     assert {"chain", "water", "board"} <= complete("bench", "")

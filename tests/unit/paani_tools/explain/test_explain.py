@@ -147,6 +147,7 @@ def test_headings_that_were_not_taken_are_told_with_why(log: Path) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_the_newest_prediction_by_then_is_told_unless_it_is_old(tmp_path: Path) -> None:
     at_us = T0_US + 8_000_000
     put = [
@@ -245,6 +246,7 @@ def test_the_picture_is_drawn(capsys: pytest.CaptureFixture[str], log: Path, tmp
         (("--picture", "no/such/p.png"), "--picture no/such/p.png"),
     ],
 )
+@pytest.mark.slow
 def test_a_mistake_is_one_line(
     capsys: pytest.CaptureFixture[str], log: Path, words: tuple[str, ...], named: str
 ) -> None:
@@ -254,6 +256,7 @@ def test_a_mistake_is_one_line(
     assert named in errors
 
 
+@pytest.mark.slow
 def test_what_the_log_has_not_is_said(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     only = write_log(tmp_path / "a.mcap", [r for r in DRIVE if r.topic == keys.ADVISORY.name])
     code, out, _ = paani(capsys, "explain", only)

@@ -35,6 +35,7 @@ def refused(capsys: pytest.CaptureFixture[str], *words: object) -> str:
     return line
 
 
+@pytest.mark.slow
 def test_info_tells_what_is_in_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = finished(tmp_path, 60)
     text = output_of(capsys, "info", path)
@@ -101,6 +102,7 @@ def test_tables_hold_nested_fields_and_lists(tmp_path: Path, capsys: pytest.Capt
     assert row["explanation"] == 'says "left", twice'
 
 
+@pytest.mark.slow
 def test_tracks_for_maps(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     gpxpy = pytest.importorskip("gpxpy")
     path = finished(tmp_path, 60)
@@ -115,6 +117,7 @@ def test_tracks_for_maps(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     assert track.segments[0].points[0].time.isoformat() == "2023-11-14T22:13:20+00:00"
 
 
+@pytest.mark.slow
 def test_what_can_be_read_is_exported_and_the_rest_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = finished(tmp_path, 60)
     data = bytearray(path.read_bytes())

@@ -142,6 +142,7 @@ def test_pictures_are_the_recorded_bytes_at_their_own_time(rrd: dict[str, Entity
     assert pinhole[0] == pytest.approx(160.0 / math.tan(math.radians(35.0)), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_boxes_lie_on_their_own_picture_and_on_no_later_one(rrd: dict[str, Entity]) -> None:
     """Each picture begins without boxes; those of a frame come once, at its time."""
     boxes = rrd["/map/boat/camera/picture/tracks"]
@@ -179,6 +180,7 @@ def test_plots_and_log(rrd: dict[str, Entity]) -> None:
     assert lines == ["STRAIGHT", "LEFT"]
 
 
+@pytest.mark.slow
 def test_without_a_screen_a_file_has_to_be_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)

@@ -81,6 +81,7 @@ def test_pictures_are_decided_anew_and_the_papers_advice_comes_out() -> None:
     assert column(stills_table(careful, OURS), "here")[0] != column(table, "paper")[0]
 
 
+@pytest.mark.slow
 def test_the_paper_profile_sails_the_papers_lake() -> None:
     table = world_table(PAPER)
     assert column(table, "here") == column(table, "paper")
@@ -112,6 +113,7 @@ def test_figures_of_networks_are_the_manifests() -> None:
     assert sizes[5] == f"{segmenter.export_max_abs_diff:.2e}"
 
 
+@pytest.mark.slow
 def test_the_papers_networks_trained_here_stand_beside_the_papers_figures() -> None:
     trained = load_catalogue(PAPER_WEIGHTS)
     table = network_table(trained["detector"], trained["segmenter"], TRAINED)
@@ -146,6 +148,7 @@ def test_what_the_papers_detector_reaches_here_is_said_beside_the_papers_figures
     assert not any(origin.name == "rendered" for origin in detector.origins)
 
 
+@pytest.mark.slow
 def test_int8_of_the_papers_segmenter_stands_beside_the_papers_figures() -> None:
     trained = Experiment("paper-segmenter", "0", "eighty pictures", (Figure("miou", "mastr1325", 0.9, 24),))
     quantised = msgspec.structs.replace(trained, figures=(Figure("miou", "mastr1325", 0.8, 24),), inference="INT8")

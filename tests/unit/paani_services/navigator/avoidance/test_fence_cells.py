@@ -47,6 +47,7 @@ POINT = st.tuples(st.floats(-12.0, 12.0), st.floats(-12.0, 12.0))
 
 @settings(deadline=None)
 @given(st.lists(POINT, min_size=3, max_size=7), st.lists(POINT, min_size=3, max_size=5))
+@pytest.mark.slow
 def test_a_cell_is_occupied_where_its_middle_is_not_allowed(
     inner: list[tuple[float, float]], outer: list[tuple[float, float]]
 ) -> None:

@@ -85,6 +85,7 @@ def test_m3_laps_of_a_route_that_repeats() -> None:
     assert ship.settle(0.1).inhibits == (Inhibit.HOLDING,)
 
 
+@pytest.mark.slow
 def test_the_order_names_the_lap() -> None:
     ship = boat(follow(*SQUARE, repeat=True, laps=3), at_m=(5.0, 0.0))
     assert ship.settle(1.0).leg == "follow route, lap 1 of 3"

@@ -164,6 +164,7 @@ def test_a_person_cut_by_the_picture_s_side_is_seen_to_stand_too() -> None:
 
 
 @pytest.mark.parametrize(("looking", "denied"), [(AT_REST, True), (BoatPose(0.0, 0.0, -1.5), False)])
+@pytest.mark.slow
 def test_an_obstacle_is_refuted_where_pictures_show_water_at_its_predicted_position(
     looking: BoatPose, denied: bool
 ) -> None:

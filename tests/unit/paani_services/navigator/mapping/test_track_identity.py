@@ -70,6 +70,7 @@ def test_an_obstacle_carries_the_id_of_the_advisors_track() -> None:
     assert obstacle.track_id == person.id > 0
 
 
+@pytest.mark.slow
 def test_the_planner_reports_the_tracks_that_it_planned_for() -> None:
     with_ids, tracks, now_us = watch(16, with_tracks=True)
     without, _, _ = watch(16, with_tracks=False)
