@@ -86,7 +86,9 @@ def _check_shapes(session: Session, contract: Model, role: str) -> Iterator[Find
         ("input", session.get_inputs(), contract.input),
         ("output", session.get_outputs(), contract.output),
     ):
-        if len(ends) != 1:
+        if what == "output" and len(ends) > 1:
+            yield Finding("warning", f"{len(ends)} outputs, of which the first alone is read")
+        elif len(ends) != 1:
             yield Finding("error", f"{len(ends)} {what}s, the contract has one")
             continue
         shape, kind = tuple(ends[0].shape), ends[0].type

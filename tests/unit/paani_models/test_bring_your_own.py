@@ -27,6 +27,7 @@ from paani_models.catalogue import (
     save_catalogue,
     verified_path,
 )
+from paani_models.engines.contract_check import Finding, inspect_model
 from paani_services.perception.corridors import classify_cells
 from paani_services.perception.engine import OnnxEngine
 from paani_services.perception.pipeline import Perceiver
@@ -311,10 +312,14 @@ def test_b7_c1_a_file_that_differs_in_its_input_alone_is_refused(tmp_path: Path,
 def test_c11_masks_beside_the_candidates_are_left_alone(tmp_path: Path) -> None:
     """An export with instance masks has a second output."""
     path, masks = tmp_path / "own.onnx", np.zeros((1, 32, 80, 104), np.float32)
-    save(path, np.zeros((1, 8, 2730), np.float32), [1, 3, 320, 416])
+    answer = np.concatenate([np.full((1, 4, 2730), 150.0), np.zeros((1, 4, 2730))], 1)
+    save(path, answer.astype(np.float32), [1, 3, 320, 416])
     model = onnx.load(str(path))
     model.graph.node.append(helper.make_node("Constant", [], ["masks"], value=numpy_helper.from_array(masks)))
     model.graph.output.append(helper.make_tensor_value_info("masks", TensorProto.FLOAT, masks.shape))
     onnx.save(model, str(path))
     evidence, _ = Perceiver(PerceptionConfig(detector=str(path)), stopwatch_ms).perceive(river(), HEADER, 0.0)
     assert (evidence.usable, evidence.detections) == (True, ())
+    findings = inspect_model(path, "detector")
+    assert Finding("warning", "2 outputs, of which the first alone is read") in findings
+    assert [finding.text for finding in findings if finding.level == "error"] == []
