@@ -27,7 +27,8 @@ def measure_segmenter(net: Path, samples: list[Sample], workers: Workers | None 
     figures = []
     for source in dict.fromkeys(item.sample.source for item in scored):
         chosen = [item for item in scored if item.sample.source == source]
-        measured = {metric: measure(sum_counts(chosen)) for metric, measure in mask_measures(source).items()}
+        counts = sum_counts(chosen)
+        measured = {metric: measure(counts) for metric, measure in mask_measures(source).items()}
         figures += [
             Figure(metric, source.name, round(value, 4), len(chosen))
             for metric, value in measured.items()

@@ -6,6 +6,7 @@ unusable picture or a wall does not read as open water. A run resumes after any 
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import cast
@@ -189,11 +190,9 @@ class SegmenterTraining:
         return float(np.mean(losses))
 
     def _loss(self, pictures: Tensor, masks: Tensor) -> Tensor:
-        if self.recipe.as_in_paper:
-            with mixed_precision():  # S7
-                return segmenter_loss(self.model(pictures), masks)
         if self.distillation is None:
-            return segmenter_loss(self.model(pictures), masks)
+            with mixed_precision() if self.recipe.as_in_paper else nullcontext():  # S7
+                return segmenter_loss(self.model(pictures), masks)
         logits, distance = self.distillation(pictures, self.model)
         return segmenter_loss(logits, masks) + cast(Tensor, distance)
 

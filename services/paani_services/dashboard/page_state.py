@@ -59,14 +59,14 @@ class PageServices(msgspec.Struct, frozen=True):
 
 
 def page_settings(config: Config) -> PageSettings:
-    source = config.camera.source
+    camera = config.camera
     is_replay = config.bus.vessel.endswith(keys.REPLAY_SUFFIX) or bool(config.dashboard.replayed)
     return PageSettings(
         vessel=config.bus.vessel,
         domain=config.bus.domain,
         profile=config.profile,
         mode="replay" if is_replay else MODES[config.bus.graph],
-        pictures="sim" if source == "sim" else "camera" if source.startswith("webcam") else "file",
+        pictures="file" if camera.is_recording else "sim" if camera.source == "sim" else "camera",
         planner=config.is_planner_active,
         world=config.world.name,
         own_hull=config.perception.ego_polygon,

@@ -118,7 +118,7 @@ def _require_lines(config: Config) -> None:
 
 def _require_source(camera: CameraConfig) -> None:
     """Raises UserError for files without a picture; a webcam is opened by its service alone."""
-    if camera.source == "sim" or camera.source.startswith("webcam"):
+    if not camera.is_recording:
         return
     try:
         next(read_frames(Path(camera.source), camera), None)

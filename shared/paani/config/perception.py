@@ -28,6 +28,11 @@ class CameraConfig(Section, frozen=True):
     height_px: Size = 240  # A8
     jpeg_quality: JpegQuality = 85  # small enough for a slow link, fine enough for the networks
 
+    @property
+    def is_recording(self) -> bool:
+        """Whether the source is a path: neither the simulator nor a webcam."""
+        return self.source != "sim" and self.source.partition(":")[0] != "webcam"
+
 
 class ImageQualityConfig(Section, frozen=True):
     """Image-quality check: a picture beyond any of these limits is no evidence. `enabled=false` is the paper (J19).

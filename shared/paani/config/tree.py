@@ -222,7 +222,7 @@ class Config(Section, frozen=True):
         autopilot, source = self.thrusters.autopilot.line, self.camera.source
         is_moved = self.thrusters.line and not is_emulated(self.thrusters.line)
         way = "thrusters.autopilot.line" if autopilot else "thrusters.line" if is_moved else ""
-        if way and source != "sim" and source.partition(":")[0] != "webcam":
+        if way and self.camera.is_recording:
             raise ValueError(f"camera.source {source}: a recording is no camera of a boat that moves ({way} is set)")
         for role, line in self.sensors.lines.items():
             name = f"sensors.{role}.line"
