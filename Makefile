@@ -36,9 +36,11 @@ test-long: setup-test ## what takes hours: the standard suite of trials, tests m
 	$(PAANI) bench faults --runs 20 --out runs/faults.json
 	$(BIN)/python -m pytest -q tests -m long || [ $$? -eq 5 ] # 5: no test is marked so
 
-# It keeps what it compiled, as a third of the time goes into compiling tests.
+# It keeps what it compiled, as a third of the time goes into compiling tests, and does not even import files that mark all
+# their tests as others than it runs: PyTorch alone takes seconds.
 check: setup-test lint ## the fast check: lint, types, import contracts, unit and contract tests
-	PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -q -n 2 --hypothesis-profile=quick tests/unit tests/contract -m "not train and not gl and not data and not slow"
+	PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -q -n 2 --hypothesis-profile=quick tests/unit tests/contract -m "not train and not gl and not data and not slow" \
+		$$(grep -rlE '^pytestmark = .*mark\.(train|gl|data|slow)\>' --include='*.py' tests/unit tests/contract | sed 's/^/--ignore=/')
 
 compiled-tests: setup-test # once, as else every worker of pytest does so when it begins
 	PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -qq --collect-only tests

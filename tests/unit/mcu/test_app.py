@@ -22,6 +22,7 @@ def run_main(*, paths: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
 
 
+@pytest.mark.slow
 def test_a2_the_nets_run_on_the_cpu_alone_and_the_app_asks_for_no_brick() -> None:
     """A2 as far as files say it: that the board's processor bears the load needs the board."""
     sessions = []

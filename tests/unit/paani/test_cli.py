@@ -14,6 +14,7 @@ from paani.cli import main
 from tests.unit.paani.logs.small_logs import NAME, finished, unfinished
 
 
+@pytest.mark.slow
 def test_run_starts_a_service_even_where_a_command_has_its_name(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         main(["run", "sensors", "--help"])

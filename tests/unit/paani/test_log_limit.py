@@ -5,6 +5,8 @@ from __future__ import annotations
 import io
 import logging
 
+import pytest
+
 from paani.clock import ManualClock
 from paani.log_limit import MAX_LINES, MAX_OF_A_KIND, WINDOW_S, LogLimit
 
@@ -25,6 +27,7 @@ class Log:
         return self.stream.getvalue().splitlines()
 
 
+@pytest.mark.slow
 def test_of_a_kind_a_few_lines_are_written_and_the_rest_counted() -> None:
     log = Log()
     for number in range(10_000):
@@ -37,6 +40,7 @@ def test_of_a_kind_a_few_lines_are_written_and_the_rest_counted() -> None:
     assert log.lines[-1] == "bad request 10000"
 
 
+@pytest.mark.slow
 def test_a_flood_of_many_kinds_is_bounded_too() -> None:
     log = Log()
     for number in range(10_000):

@@ -31,6 +31,7 @@ def test_a_fault_is_a_picture_and_repeats(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["underexposed", "overexposed", "blur", "noise", "cover", "drops", "drop_out", "fog"])
+@pytest.mark.slow
 def test_a_higher_severity_departs_further(name: str) -> None:
     def departure(severity: int) -> float:
         picture, _ = apply_fault(name, RIVER, MASK, severity, rng())

@@ -192,6 +192,7 @@ def test_outputs_that_are_not_of_the_contract(
     assert named in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_dynamic_axes_are_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "own.onnx"
     save(path, candidates(200.0, 0.5), ["batch", 3, 320, 416])

@@ -156,6 +156,7 @@ def nothing(kind: str) -> np.ndarray:
 
 
 @pytest.mark.parametrize("kind", ["black", "noisy black", "white", "grey", "noisy grey", "noise", "brown lens cap"])
+@pytest.mark.slow
 def test_nothing_to_see_is_never_water_v15(kind: str) -> None:
     """The paper's own failure: a black picture read as open water."""
     label = open_network(verified_path("segmenter"), threads=1)(segmenter_input(nothing(kind)))[0].argmax(0)

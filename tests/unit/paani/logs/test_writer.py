@@ -70,6 +70,7 @@ def test_every_row_of_the_table_has_a_channel(tmp_path: Path) -> None:
     }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_picture_and_its_header_are_exact(tmp_path: Path) -> None:
     by_topic: dict[str, list[Any]] = {}
     for _, channel, one in messages(finished(tmp_path, 10)):
@@ -81,6 +82,7 @@ def test_a_picture_and_its_header_are_exact(tmp_path: Path) -> None:
     assert msgspec.json.decode(headers[1].data, type=m.PictureHeader).frame_seq == 1
 
 
+@pytest.mark.slow
 def test_what_has_no_header_stands_apart(tmp_path: Path) -> None:
     log = begin(tmp_path)
     log.write(keys.ODOMETRY, START_US, None, b"\xff not json", b"")
@@ -95,6 +97,7 @@ def test_what_has_no_header_stands_apart(tmp_path: Path) -> None:
     assert sum(topic == "localization/odometry" for topic, _ in found) == 1
 
 
+@pytest.mark.slow
 def test_sequence_numbers_wrap_where_the_format_s_do(tmp_path: Path) -> None:
     log = begin(tmp_path)
     put(log, keys.ODOMETRY, odometry(1, seq=2**32 + 3))
@@ -102,6 +105,7 @@ def test_sequence_numbers_wrap_where_the_format_s_do(tmp_path: Path) -> None:
     assert next(one.sequence for _, channel, one in messages(log.path) if channel.topic == keys.ODOMETRY.name) == 3
 
 
+@pytest.mark.slow
 def test_an_existing_file_is_never_written_over(tmp_path: Path) -> None:
     path = finished(tmp_path)
     with pytest.raises(FileExistsError):

@@ -90,6 +90,7 @@ def test_a_stream_that_looks_like_messages_raises_nothing(data: bytes) -> None:
 
 
 @given(st.lists(st.booleans(), min_size=1, max_size=30), st.randoms(use_true_random=False))
+@pytest.mark.slow
 def test_a_damaged_message_costs_no_other(is_damaged: list[bool], rng: random.Random) -> None:
     """Flipped, lost and doubled bytes; 20,000 of them are tried on the firmware in `tests/firmware`."""
     stream, intact = [], []

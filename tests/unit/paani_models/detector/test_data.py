@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from paani_models.datasets.sources import NO_CRAFT, Source
 from paani_models.detector.data import (
@@ -34,6 +35,7 @@ def test_letterbox_is_centred_c3() -> None:
     np.testing.assert_allclose(affine, [[0.625, 0, 0], [0, 0.625, 38]])
 
 
+@pytest.mark.slow
 def test_boxes_follow_the_picture() -> None:
     for seed in range(20):
         rng = np.random.default_rng(seed)
@@ -98,6 +100,7 @@ def test_sources_without_craft_and_the_own_hull_hold_no_object() -> None:
     assert not judged[:, 90, 20].any()
 
 
+@pytest.mark.slow
 def test_a_close_up_gives_a_small_object_its_pixels_and_keeps_it_in_view() -> None:
     item = BoxedPicture(
         "s",

@@ -68,6 +68,7 @@ def test_ap50_95_averages_the_iou_steps_u2() -> None:
     assert (figures["n"], figures["recall_at_0.40"], figures["precision_at_0.40"]) == (1, 1.0, 1.0)
 
 
+@pytest.mark.slow
 def test_a_second_box_on_the_same_object_is_a_false_alarm() -> None:
     twice = np.vstack([BOX, BOX])
     assert match_boxes(twice, np.array([0.5, 0.9], np.float32), BOX, 0.5).tolist() == [False, True]

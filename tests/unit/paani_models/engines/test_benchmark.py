@@ -35,6 +35,7 @@ def test_multiply_adds_by_hand(tmp_path: Path) -> None:
     assert count_multiply_adds(small_segmenter(tmp_path / "own.onnx")) == 3 * 256 * 320 * 3
 
 
+@pytest.mark.slow
 def test_a_frame_costs_less_than_two_thirds_of_the_papers_pair() -> None:
     total = sum(count_multiply_adds(verified_path(role)) or 1e9 for role in PAPER_MULTIPLY_ADDS)
     assert total < 2 / 3 * sum(PAPER_MULTIPLY_ADDS.values())

@@ -56,6 +56,7 @@ def detector(tmp_path: Path) -> Path:
     return place(Path(shutil.copy(verified_path("detector"), tmp_path)), NO_BOXES, bytes(4 * 8 * 2730))
 
 
+@pytest.mark.slow
 def test_outputs_of_both_engines_agree(segmenter: Path) -> None:
     one, other = (engine_class(name).load("segmenter", str(segmenter), 1) for name in ("onnxruntime", "ncnn"))
     assert isinstance(one, OnnxEngine)
@@ -211,6 +212,7 @@ def test_a_bad_conversion_leaves_nothing(
     assert sorted(path.name for path in tmp_path.iterdir()) == ["own.onnx", "pnnx"]
 
 
+@pytest.mark.slow
 def test_a_missing_pnnx_is_reported_with_its_remedy(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -18,8 +18,9 @@ from paani_models.recipes.train_and_export import TrainingOptions, start_detecto
 from paani_models.recipes.warm_start import load_exported  # noqa: E402
 from paani_models.training.training_state import save_checkpoint  # noqa: E402
 
+pytestmark = pytest.mark.train
 
-@pytest.mark.train
+
 def test_a_detector_may_start_from_the_mean_of_two(tmp_path: Path) -> None:
     """A checkpoint and an exported file."""
     stored = Detector()
@@ -34,7 +35,6 @@ def test_a_detector_may_start_from_the_mean_of_two(tmp_path: Path) -> None:
     torch.testing.assert_close(mean, (alone[0] + alone[1]) / 2)
 
 
-@pytest.mark.train
 def test_an_image_quality_check_takes_its_share_of_an_earlier_one() -> None:
     mixed, earlier = ImageQualityNetwork(), ImageQualityNetwork()
     start_from_export(earlier, verified_path("gate"))
@@ -44,7 +44,6 @@ def test_an_image_quality_check_takes_its_share_of_an_earlier_one() -> None:
         torch.testing.assert_close(weight, 0.75 * before[name] + 0.25 * earlier.state_dict()[name])
 
 
-@pytest.mark.train
 def test_a_detector_is_exported_with_a_share_of_earlier_weights(tmp_path: Path) -> None:
     earlier, later, loaded = Detector(), Detector(), Detector()
     recipe = {"seed": 1, "height_px": 64, "width_px": 96}

@@ -42,6 +42,7 @@ def test_the_temperature_is_found_and_lowers_the_error() -> None:
     assert format_mask_calibration(found).startswith(f"perception.temperature = {found.temperature:g}: ")
 
 
+@pytest.mark.slow
 def test_a_sequence_is_judged_by_what_the_other_half_asks_for() -> None:
     """Two sequences that ask for different temperatures: each at the other's is worse than as it is."""
     counted = [count_cells(*picture(1, 2.0)), count_cells(*picture(2, 0.5))]

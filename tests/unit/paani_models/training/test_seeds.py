@@ -15,6 +15,7 @@ from paani_models.segmenter.train import CACHE_WH, CachedPicture, SegmenterTrain
 from paani_models.training.training_state import Stage  # noqa: E402
 from tests.places import ROOT  # noqa: E402
 
+pytestmark = pytest.mark.train
 RECIPE = train.SegmenterRecipe(stages=(Stage(3, 64, 64),), batch=4, warmup_steps=2)
 
 
@@ -26,7 +27,6 @@ def striped(rng: np.random.Generator) -> CachedPicture:
     return CachedPicture("river", np.array([[30, 60, 90], [40, 90, 30], [200, 210, 230]], np.uint8)[mask], mask)
 
 
-@pytest.mark.train
 @pytest.mark.slow
 def test_w8_every_seed_learns_and_gives_its_own_network(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """W8: the seed is the recipe's. Three seeds give three networks whose loss falls; one seed repeats its network."""

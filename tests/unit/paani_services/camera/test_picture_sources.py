@@ -68,6 +68,7 @@ def test_a_single_picture_is_a_camera_that_shows_the_same(folder: Path) -> None:
     assert [f.media_us for f in frames] == [0, 200_000, 400_000, 600_000]
 
 
+@pytest.mark.slow
 def test_a_video_at_a_fixed_rate_keeps_its_media_time(video: Path) -> None:
     """I17: every frame, 0.2 s apart on the bus, 1/15 s apart in the recording."""
     frames = list(play_frames(video, FIXED))

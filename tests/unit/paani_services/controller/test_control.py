@@ -237,6 +237,7 @@ def test_the_integral_does_not_wind_up_while_saturated() -> None:
     step_us=st.integers(20_000, 300_000),
     profile=st.sampled_from([PAPER, PAANI]),
 )
+@pytest.mark.slow
 def test_thrust_is_bounded_and_in_the_paper_never_astern(
     heading: float,
     speed: float,

@@ -63,6 +63,7 @@ def test_what_is_protected_or_being_written_is_not_deleted(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     "name", ["../secret.mcap", "/etc/passwd", "notes.mcap", "", ".", NAME, f"../{NAME}", NAME + "\0"]
 )
+@pytest.mark.slow
 def test_nothing_else_is_a_recording(tmp_path: Path, name: str) -> None:
     folder, outside = tmp_path / "in", finished(tmp_path)
     folder.mkdir()
@@ -81,6 +82,7 @@ def test_without_a_recorder_there_is_no_folder() -> None:
     assert (status, "recorder.folder" in text) == (404, True)
 
 
+@pytest.mark.slow
 def test_the_series_of_a_recording(tmp_path: Path) -> None:
     log = begin(tmp_path)
     for number in range(3):
@@ -110,6 +112,7 @@ def test_the_series_of_a_recording(tmp_path: Path) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_the_frames_of_a_recording(tmp_path: Path) -> None:
     packed = recording_reader.read_frames(open_log(finished(tmp_path)), START_US + 500_000, START_US + 1_500_000)
     frames, at = [], 0
@@ -127,6 +130,7 @@ def test_the_frames_of_a_recording(tmp_path: Path) -> None:
     assert msgspec.json.decode(pictures[0][0].picture, type=m.PictureHeader).frame_seq == 2
 
 
+@pytest.mark.slow
 def test_too_much_at_once_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(recording_reader, "MAX_BYTES", 9000)
     with pytest.raises(UserError, match="more than"):

@@ -14,6 +14,7 @@ def rows_of(profile: str, sets: tuple[str, ...] = (), environ: dict[str, str] | 
 
 
 @pytest.mark.parametrize("profile", PROFILES)
+@pytest.mark.slow
 def test_a_profile_alone_gives_no_value_of_another_origin(profile: str) -> None:
     assert {row.origin for row in rows_of(profile).values()} <= {"default", "profile"}
 

@@ -142,6 +142,7 @@ def test_nothing_is_said_between_messages() -> None:
 
 
 @pytest.mark.parametrize("graph", list(keys.Graph))
+@pytest.mark.slow
 def test_no_channel_tells_the_truth_of_the_simulator(graph: keys.Graph) -> None:
     offered = channels(graph)
     assert not any(name.startswith("@") or "/request/" in name or name.endswith("/step") for name in offered)

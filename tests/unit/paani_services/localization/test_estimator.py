@@ -257,6 +257,7 @@ def test_a_late_fix_says_where_the_boat_was(late: int) -> None:
 
 
 @pytest.mark.parametrize("off_s", [-1.1, 1.1])
+@pytest.mark.slow
 def test_a_fix_from_another_time_than_the_imu_s_is_dropped_and_counted(boat: EstimatedBoat, off_s: float) -> None:
     """Behind it or ahead of it: the position at the time of the IMU would be a guess."""
     boat.imu = off_s < 0.0  # a fix ahead of the IMU is one whose IMU has fallen silent
@@ -284,6 +285,7 @@ def test_what_the_imu_saw_before_a_gap_does_not_say_that_the_boat_lies_still_aft
 
 
 @pytest.mark.parametrize("gap_s", [1.0, 2.0])
+@pytest.mark.slow
 def test_a_gap_of_the_imu_widens_the_estimates_by_the_way_that_the_boat_may_have_made(
     boat: EstimatedBoat, gap_s: float
 ) -> None:
@@ -298,6 +300,7 @@ def test_a_gap_of_the_imu_widens_the_estimates_by_the_way_that_the_boat_may_have
     assert boat.global_estimate.position_std_m > 0.95 * math.hypot(before_m, 0.5 * gap_s)
 
 
+@pytest.mark.slow
 def test_first_fix_is_the_origin_when_none_is_set() -> None:
     boat = EstimatedBoat(LocalizationConfig())
     boat.sail(4.0)

@@ -135,6 +135,7 @@ def test_what_is_stale_is_unhealthy_until_it_comes_again(boat: EstimatedBoat) ->
     assert (boat.global_estimate.healthy, boat.local_estimate.healthy) == (False, False)
 
 
+@pytest.mark.slow
 def test_without_a_heading_the_estimate_is_unhealthy(boat: EstimatedBoat) -> None:
     def blind(samples: list[ImuSample]) -> list[ImuSample]:
         return [msgspec.structs.replace(sample, orientation_available=False) for sample in samples]
@@ -146,6 +147,7 @@ def test_without_a_heading_the_estimate_is_unhealthy(boat: EstimatedBoat) -> Non
     assert not boat.global_estimate.healthy
 
 
+@pytest.mark.slow
 def test_what_is_not_a_number_is_dropped_and_counted(boat: EstimatedBoat) -> None:
     boat.change_fix = lambda fix: msgspec.structs.replace(fix, latitude_deg=math.nan)
     boat.sail(0.4)

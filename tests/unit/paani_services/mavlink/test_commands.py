@@ -82,6 +82,7 @@ def test_nobody_who_is_not_trusted_asks_for_anything(command: int, parameters: t
 
 
 @given(COMMANDS.filter(lambda number: number != commands.ARM_DISARM), st.lists(ANY, min_size=7, max_size=7))
+@pytest.mark.slow
 def test_nothing_but_the_command_that_arms_arms(command: int, parameters: list[float]) -> None:
     assert judge(command, *parameters).act is not Act.ARM
 

@@ -45,6 +45,7 @@ def test_a_station_is_sent_the_heartbeat_alone_until_it_speaks_and_again_when_it
     assert set(kinds(peer.received())) == {"HEARTBEAT"}
 
 
+@pytest.mark.slow
 def test_telemetry_at_its_default_rates() -> None:
     """Ten seconds at 50 Hz; nothing is made up for after a pause."""
     port, peer = made()
@@ -339,6 +340,7 @@ def test_a_station_that_floods_is_not_heard_and_is_again_later() -> None:
 
 
 @given(st.binary(max_size=600), st.integers(1, 40))
+@pytest.mark.slow
 def test_bytes_of_any_kind_do_nothing_and_the_next_frame_is_read(noise: bytes, chunk: int) -> None:
     """In pieces of any size. What looks like the beginning of a frame takes at most 280 bytes with it."""
     port, peer = made()

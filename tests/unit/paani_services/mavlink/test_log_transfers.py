@@ -93,6 +93,7 @@ def test_an_empty_folder_has_one_entry_that_says_so() -> None:
     assert (entry.id, entry.num_logs) == (0, 0)
 
 
+@pytest.mark.slow
 def test_a_long_list_is_whole_and_of_the_newest() -> None:
     entries = Disk(*[b"x"] * (MAX_LOGS + 5)).entries()
     assert [each.id for each in entries] == list(range(1, MAX_LOGS + 1))

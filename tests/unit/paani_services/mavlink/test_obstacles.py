@@ -101,6 +101,7 @@ def test_without_anything_that_comes_nearer_nothing_is_told() -> None:
 
 
 @given(st.floats(-60.0, 60.0), st.floats(-60.0, 60.0), st.floats(0.0, 8.0), st.floats(-7.0, 7.0))
+@pytest.mark.slow
 def test_the_obstacles_middle_and_edges_lie_in_its_sectors(x_m: float, y_m: float, radius_m: float, yaw: float) -> None:
     pose = odometry(yaw_rad=yaw)
     distance_m, sectors = sectors_of(obstacle(x_m, y_m, radius_m), pose)

@@ -68,6 +68,7 @@ def test_quaternion_and_angles_agree(yaw_rad: float, pitch_rad: float, roll_rad:
 
 
 @given(st.floats(-90.0, 90.0), st.floats(-180.0, 180.0))
+@pytest.mark.slow
 def test_every_place_is_read_back_to_a_centimetre(latitude_deg: float, longitude_deg: float) -> None:
     found = sent(in_order(odometry=odometry(latitude_deg=latitude_deg, longitude_deg=longitude_deg)))
     position = found["GLOBAL_POSITION_INT"]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -23,6 +24,7 @@ def size(folder: Path) -> int:
     return sum(file.stat().st_size for file in folder.iterdir())
 
 
+@pytest.mark.slow
 def test_the_newest_are_kept_and_the_size_is_bounded(tmp_path: Path) -> None:
     """P2: perception has its own bounded observation journal."""
     journal = Journal(tmp_path / "journal", 1000)
@@ -36,6 +38,7 @@ def test_the_newest_are_kept_and_the_size_is_bounded(tmp_path: Path) -> None:
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=30)
 @given(st.lists(st.binary(max_size=300).map(lambda data: data.hex().encode()), max_size=30), st.integers(0, 1000))
+@pytest.mark.slow
 def test_the_bound_holds_for_any_lines(tmp_path: Path, written: list[bytes], max_bytes: int) -> None:
     """Property: the bound holds, and what is kept is the end of what was taken."""
     folder = tmp_path / "j"

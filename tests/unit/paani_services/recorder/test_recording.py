@@ -93,6 +93,7 @@ def test_a_part_ends_when_it_is_large(tmp_path: Path) -> None:
     assert poses(tmp_path) == list(range(1500))
 
 
+@pytest.mark.slow
 def test_a_crash_loses_at_most_what_was_not_flushed(tmp_path: Path) -> None:
     recording = Recording(settings(tmp_path, flush_s=0.5), describe_system(Config()), TOPICS)
     record(recording, range(95))

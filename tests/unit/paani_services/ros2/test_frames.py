@@ -59,6 +59,7 @@ def test_a_heading_to_port_turns_ahead_to_the_left() -> None:
 
 
 @given(TRANSFORMS, TRANSFORMS, st.builds(Vector, METRES, METRES, METRES))
+@pytest.mark.slow
 def test_map_to_odom_closes_the_chain(in_map: Transform, in_odom: Transform, point: Vector) -> None:
     """A point of the boat lies in the same place of the map, by the odometry and by way of `odom`."""
     between = parent_between(in_map, in_odom)
@@ -66,6 +67,7 @@ def test_map_to_odom_closes_the_chain(in_map: Transform, in_odom: Transform, poi
 
 
 @given(st.floats(-20.0, 40.0), st.floats(-20.0, 20.0), st.floats(-50.0, 50.0), TILT, TILT, ANGLE)
+@pytest.mark.slow
 def test_the_camera_looks_where_the_navigator_has_it(
     down_deg: float, roll_deg: float, yaw_deg: float, roll_rad: float, pitch_rad: float, heading_rad: float
 ) -> None:

@@ -127,6 +127,7 @@ def test_the_estimate_in_the_map(x_m: float, y_m: float, yaw_rad: float) -> None
 
 
 @given(METRES, METRES, ANGLE, METRES, METRES, ANGLE)
+@pytest.mark.slow
 def test_the_transforms_lead_from_the_map_to_the_boat(
     x_m: float, y_m: float, yaw_rad: float, odom_x_m: float, odom_y_m: float, odom_yaw_rad: float
 ) -> None:

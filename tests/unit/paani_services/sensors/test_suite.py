@@ -138,6 +138,7 @@ def test_a_unit_that_began_anew_keeps_its_time() -> None:
     assert sample.source_us == bench.now_us
 
 
+@pytest.mark.slow
 def test_a12_an_mpu6050_has_no_orientation_until_a_compass_gives_the_heading() -> None:
     alone = Bench(SensorDevicesConfig(imu=ImuConfig(line=IMU)))
     assert {sample.orientation_available for sample in alone.run_imu(1.0)} == {False}
@@ -257,6 +258,7 @@ def test_a_receiver_that_rests_goes_on_and_one_that_stands_at_speed_is_withheld(
     assert bench.fixes(rmc("123640", "4807.0390,N", knots=2.0))
 
 
+@pytest.mark.slow
 def test_an_inertial_unit_that_repeats_one_sample_is_withheld_until_it_changes() -> None:
     bench = Bench()
     assert len(bench.run_imu(1.0)) == 100
@@ -280,6 +282,7 @@ def test_a_unit_in_g_is_withheld() -> None:
     assert "m/s^2" in device.note
 
 
+@pytest.mark.slow
 def test_a_compass_that_stands_while_the_gyro_turns_is_withheld() -> None:
     bench = Bench()
     found: list[ImuSample] = []

@@ -252,6 +252,7 @@ SIDE = st.floats(min_value=-1.0, max_value=1.0)
         max_size=12,
     )
 )
+@pytest.mark.slow
 def test_whatever_happens_thrust_goes_only_to_one_that_was_armed_by_the_operator(
     words: list[tuple[bool | None, int, float, float, float]],
 ) -> None:

@@ -82,6 +82,7 @@ def sail(
 
 
 @pytest.mark.parametrize("planner", PLANNERS)
+@pytest.mark.slow
 def test_a_free_course_is_held(planner: MotionPlanner) -> None:
     x_m, y_m, widest_m, _ = sail(planner, [(10.0, 6.0, 1.0), (14.0, -6.0, 1.0)], until_s=30.0)
     assert x_m > 0.9 * SPEED_MPS * 30.0

@@ -137,6 +137,7 @@ def test_a_result_names_the_machine_that_made_it_and_files_of_one_name_have_resu
     assert one.stem != other.stem
 
 
+@pytest.mark.slow
 def test_stored_results_survive_their_file(tmp_path: Path, reader: FingerprintReader) -> None:
     write(tmp_path, CASES[0], reader.fingerprint(CASES[0]))
     record = read_stored_result(result_path(tmp_path, CASES[0]))

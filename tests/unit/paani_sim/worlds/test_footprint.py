@@ -57,6 +57,7 @@ def canal() -> World:
     return load_world("canal")
 
 
+@pytest.mark.slow
 def test_the_colliding_shape_is_the_outline(canal: World) -> None:
     model = build_spec(canal).compile()
     data = mujoco.MjData(model)

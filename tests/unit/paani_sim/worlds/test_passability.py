@@ -49,6 +49,7 @@ def test_distances_are_to_the_footprint() -> None:
     assert obstacle_distance_m((), points_m).tolist() == [np.inf] * 4
 
 
+@pytest.mark.slow
 def test_a_barge_across_the_canal_blocks_it_and_one_along_does_not() -> None:
     world = cut_route(load_world("canal"), 20.0, 40.0)
     route = RouteFrame(world.route_m, closed=False)

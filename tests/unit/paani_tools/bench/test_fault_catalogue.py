@@ -143,6 +143,7 @@ def test_an_expired_certificate_takes_the_place_of_one_and_gives_it_back(tmp_pat
     assert {name: back.common_name(name) for name in names} == names
 
 
+@pytest.mark.slow
 async def test_a_cable_carries_both_ways_hangs_up_and_comes_back_by_its_name() -> None:
     """What is sent while it is out is lost, and the far end does not notice."""
     mcu, line = os.openpty()

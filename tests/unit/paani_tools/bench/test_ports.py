@@ -59,6 +59,7 @@ def test_a_port_that_nobody_hears_or_that_does_not_obey_is_no_success(
     assert keeps_bars(ports_report(10.0, ["nmea"], rounds, {"nmea": ages_s}, stick_latencies)) is kept
 
 
+@pytest.mark.slow
 def test_a_port_that_is_none_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit, match="2"):
         paani(["bench", "ports", "--ports", "telex"])

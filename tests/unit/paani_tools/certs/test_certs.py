@@ -203,6 +203,7 @@ def test_out_of_date_is_told_with_file_and_date(tmp_path: Path, shift_days: int,
     assert main(["show", "--folder", str(folder)]) == 1
 
 
+@pytest.mark.slow
 def test_what_is_not_in_force_or_not_private_is_told(folder: Path) -> None:
     bus = BusConfig(certificates=str(folder))
     (folder / "advisor.1.key").chmod(0o640)

@@ -43,6 +43,7 @@ def test_bash_completes_sub_commands() -> None:
     assert "--drive" in complete("bench", "judgement", "--d")
 
 
+@pytest.mark.slow
 def test_bash_completes_files_where_an_option_takes_one() -> None:
     assert {"etc", "usr"} <= {word.strip("/") for word in complete("up", "--config", "")}
 

@@ -77,6 +77,7 @@ def test_by_default_the_last_change_of_direction_is_told(capsys: pytest.CaptureF
     assert datetime.datetime.fromtimestamp(at_us * 1e-6, tz=datetime.UTC).strftime("%Y-%m-%d %H:%M:%S") in out
 
 
+@pytest.mark.slow
 def test_the_order_names_the_tracks_that_it_was_planned_for(log: Path) -> None:
     """By the labels and numbers of the tracks; one that is tracked no more by its number alone."""
     moment = moment_at(open_log(log), T0_US + 8_000_000)
@@ -198,6 +199,7 @@ def test_lanes_carry_their_numbers_and_thresholds(capsys: pytest.CaptureFixture[
         ),
     ],
 )
+@pytest.mark.slow
 def test_a_boat_that_is_held_says_why(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, held: dict[str, object], text: str
 ) -> None:

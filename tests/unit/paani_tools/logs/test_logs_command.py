@@ -74,6 +74,7 @@ def test_an_unfinished_file_is_told_and_mended(tmp_path: Path, capsys: pytest.Ca
     output_of(capsys, "info", path)
 
 
+@pytest.mark.slow
 def test_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, out = finished(tmp_path, 60), tmp_path / "tables"
     assert "2 tables, 72 rows" in output_of(capsys, "export", path, "--csv", out)
@@ -85,6 +86,7 @@ def test_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert [int(row["log_us"]) for row in rows] == [START_US + 50_000 * number for number in range(60)]
 
 
+@pytest.mark.slow
 def test_tables_hold_nested_fields_and_lists(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     from tests.unit.paani.logs.small_logs import begin, put  # noqa: PLC0415
 

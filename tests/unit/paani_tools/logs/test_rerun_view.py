@@ -154,6 +154,7 @@ def test_boxes_lie_on_their_own_picture_and_on_no_later_one(rrd: dict[str, Entit
     assert boxes.column("Boxes2D:half_sizes")[0] == [[40.0, 30.0]]
 
 
+@pytest.mark.slow
 def test_what_was_not_renewed_is_cleared_when_it_went_stale(rrd: dict[str, Entity]) -> None:
     stale_us = START_US + 1 + round(keys.PREDICTION.fresh_s * 1e6)
     for name in ("/map/plan", "/map/obstacles", "/map/home"):
@@ -188,6 +189,7 @@ def test_without_a_screen_a_file_has_to_be_named(tmp_path: Path, monkeypatch: py
         main(["view", str(small_logs.finished(tmp_path)), "--rerun"])
 
 
+@pytest.mark.slow
 def test_the_viewer_is_named(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="say in what: --rerun"):
         main(["view", str(small_logs.finished(tmp_path))])

@@ -147,6 +147,7 @@ def test_a_mistake_is_one_line_and_exit_2(tmp_path: Path, capsys: pytest.Capture
         (["--sheet", "sheet.txt"], "--sheet sheet.txt"),
     ],
 )
+@pytest.mark.slow
 def test_an_impossible_output_is_refused_before_the_first_picture(
     options: list[str], named: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -217,6 +218,7 @@ def test_a_sheet_of_many_is_spread_over_all_of_them() -> None:
 
 
 @pytest.mark.parametrize("name", ["sheet.gif", "nowhere/sheet.png"])
+@pytest.mark.slow
 def test_a_sheet_that_cannot_be_written_is_named(folder: Path, name: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert paani(["look", str(folder), "--sheet", str(folder / name)]) == 2
     error = capsys.readouterr().err

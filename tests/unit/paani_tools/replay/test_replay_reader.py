@@ -137,6 +137,7 @@ def test_a_cut_file_is_read_up_to_the_cut(tmp_path: Path, whole: bytes, cut: flo
     assert cut < 0.3 or len(read) > 100
 
 
+@pytest.mark.slow
 def test_a_damaged_chunk_costs_itself_alone(tmp_path: Path, whole: bytes) -> None:
     spans = opened(tmp_path, whole)._parts[0].spans
     at = spans[len(spans) // 2].offset + 500

@@ -40,6 +40,7 @@ def test_time_that_is_not_unix_time_stays() -> None:
 
 
 @given(st.lists(st.integers(0, 10**10), min_size=2, max_size=6), st.sampled_from([0.01, 0.5, 1.0, 3.0, 1000.0]))
+@pytest.mark.slow
 def test_the_order_of_times_and_equal_stamps_stay(offsets_us: list[int], speed: float) -> None:
     shift = TimeShift(T0_US, T0_US + 10**12, speed)
     moved = [shift.shift_us(T0_US + offset) for offset in offsets_us]

@@ -116,6 +116,7 @@ def test_encounters_do_not_depend_on_where_north_is(motion: Motion, turn: float)
 
 @HALF_ARE_PAST
 @given(PLACES, PLACES, SPEEDS, SPEEDS, st.floats(0.0, 1.0))
+@pytest.mark.slow
 def test_the_closest_point_stays_where_it_is_while_it_comes_nearer(
     x: float, y: float, east: float, north: float, part: float
 ) -> None:

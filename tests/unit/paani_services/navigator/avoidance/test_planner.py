@@ -362,6 +362,7 @@ def test_a_boat_with_its_bow_aslant_to_an_obstacle_pivots_away(gap_m: float) -> 
 
 
 @pytest.mark.parametrize("course", [1.2, 2.0, 2.8])
+@pytest.mark.slow
 def test_a_stopped_boat_facing_away_pivots_to_its_course_before_it_moves(course: float) -> None:
     """An obstacle may have come up on the side that the camera has not seen since the boat stopped."""
     row, column = np.indices((GRID_CELLS, GRID_CELLS))

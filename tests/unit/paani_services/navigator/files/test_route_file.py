@@ -95,6 +95,7 @@ def test_mistakes_are_named(tmp_path: Path, text: str, named: str) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(WORLDS))
+@pytest.mark.slow
 def test_k2_route_of_each_world_is_a_route_file(tmp_path: Path, name: str) -> None:
     """K2: the lake's repeating route has 59 waypoints and is 465.443 m long, as the navigator reads it."""
     world = load_world(name)

@@ -92,6 +92,7 @@ def watched(
 
 @pytest.mark.parametrize("velocity", [(0.0, 0.13), (-0.13, 0.0), (-0.09, -0.09)])
 @pytest.mark.parametrize("side_m", [0.0, 2.2, -2.2])  # at 2.2 m one end is outside the picture
+@pytest.mark.slow
 def test_a_vessel_adrift_is_told_from_a_moored_one_in_8_s(velocity: tuple[float, float], side_m: float) -> None:
     """0.13 m/s is 0.33 m in `fit_s`, as much as one row of the mask at 4 m; in 8 s it is 1 m."""
     (vessel,) = watched(velocity, 4.0, side_m)

@@ -53,6 +53,7 @@ def test_a_bend_shows_which_way_the_bottom_rises(up_rad: float) -> None:
 
 
 @given(st.integers(0, 10_000), st.floats(0.7, 10.0))
+@pytest.mark.slow
 def test_noise_on_a_level_bottom_is_seldom_a_slope_and_its_deviation_is_honest(seed: int, depth_m: float) -> None:
     rng = np.random.default_rng(seed)
     std_m = STD_M + STD_FRAC * depth_m

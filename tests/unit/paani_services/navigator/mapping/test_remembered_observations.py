@@ -95,6 +95,7 @@ def test_observations_do_not_move_with_the_gps_position() -> None:
 
 @settings(max_examples=20, deadline=None)
 @given(st.floats(-0.8, 0.8), st.floats(-0.3, 0.3), st.floats(-3.1, 3.1), st.floats(-0.3, 0.3))
+@pytest.mark.slow
 def test_the_position_is_dead_reckoned_from_the_velocity_over_ground(
     surge: float, sway: float, yaw: float, rate: float
 ) -> None:
