@@ -4,6 +4,7 @@ One mirrored pass for the reflections, then sky, land, plants and things, then t
 slope, wind, mirror image and sky. Deterministic for world, pose, time and light.
 """
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from types import ModuleType, TracebackType
@@ -13,7 +14,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from paani.arrays import F32, F64
+from paani.arrays import F32, F64, U8
 from paani_sim.eye import gl as g
 from paani_sim.eye import shaders, water_patches
 from paani_sim.eye.camera import BoatPose, Camera, camera_pose, linear_depth_m, view_projection
@@ -47,6 +48,7 @@ DETAILS_WITHIN_M = 80.0
 SHADOWS_WITHIN_M = 40.0
 SAME_SURFACE_FRAC = 0.05
 MIRRORED_WITHIN_M = 120.0
+_PAINTED_WORLDS = 2  # painting is half of what an eye costs to open, and drives of one world follow each other
 _SCREEN_CORNERS = water_patches.CORNERS.astype(np.float32)
 _IDENTITY = np.eye(4, dtype=np.float32)
 
@@ -73,6 +75,12 @@ class _Movable(NamedTuple):
     thing: Obstacle | Actor
     batch: g.Batch
     reach_m: float
+
+
+@functools.lru_cache(_PAINTED_WORLDS)
+def _paint_textures(seed: int, season_frac: float) -> tuple[U8, U8, U8, U8]:
+    """Noise, sprites, slopes and surfaces."""
+    return noise_tile(seed), paint_sprites(seed, season_frac), slope_tile(seed), surface_tiles(seed)
 
 
 class Eye:
@@ -131,11 +139,11 @@ class Eye:
 
     def _upload(self) -> None:
         gl, scene = self._gl, self.scene
-        g.make_texture(gl, noise_tile(self.world.seed), _NOISE, between_levels=False)
-        sprites = paint_sprites(self.world.seed, self.world.season_frac)
+        noise, sprites, slopes, surfaces = _paint_textures(self.world.seed, self.world.season_frac)
+        g.make_texture(gl, noise, _NOISE, between_levels=False)
         g.make_texture(gl, sprites, _SPRITES, wrap_u=False, wrap_v=False)
-        g.make_texture(gl, slope_tile(self.world.seed), _SLOPES, between_levels=False)
-        g.make_texture(gl, surface_tiles(self.world.seed), _SURFACES, between_levels=False)
+        g.make_texture(gl, slopes, _SLOPES, between_levels=False)
+        g.make_texture(gl, surfaces, _SURFACES, between_levels=False)
         width, height = self.camera.width_px, self.camera.height_px
         self._mirror = g.make_target(gl, width // 2, height // 2, _MIRROR, slots=1)  # water blurs it twice over
         self._stirred = g.make_target(gl, width, height, _STIRRED, slots=1, fine=True)

@@ -61,24 +61,15 @@ class _Canvas:
         lean: float = 1.0,
     ) -> None:
         """Small ellipses at `x, y` pixels with colours 0..1, in the given order."""
-        colours = np.clip(rgb * 255.0, 0, 255).astype(int).tolist()
-        turn = (np.abs(np.sin(x * 12.9898 + y * 78.233)) * 180.0).tolist()
-        for px, py, r, c, a in zip(
-            (x * 16).astype(int).tolist(),
-            (y * 16).astype(int).tolist(),
-            radius.tolist(),
-            colours,
-            turn,
-            strict=True,
+        colours = np.clip(rgb * 255.0, 0, 255).astype(int)
+        ink = np.column_stack([colours, np.full(len(colours), 255)]).tolist()
+        centres = (np.column_stack([x, y]) * 16).astype(int) / 16
+        along, across = (np.maximum(1, each.astype(int)) / 8 for each in (radius * 16, radius * 16 * 0.6 * lean))
+        turn = np.abs(np.sin(x * 12.9898 + y * 78.233)) * 180.0
+        for centre, size, angle, colour in zip(
+            centres.tolist(), np.column_stack([along, across]).tolist(), turn.tolist(), ink, strict=True
         ):
-            axes = (max(1, int(r * 16)), max(1, int(r * 16 * 0.6 * lean)))
-            cv2.ellipse(
-                self.rgba,
-                ((px / 16, py / 16), (axes[0] / 8, axes[1] / 8), a),
-                (*c, 255),
-                -1,
-                cv2.LINE_8,
-            )
+            cv2.ellipse(self.rgba, (centre, size, angle), colour, -1, cv2.LINE_8)
 
     def line(self, start: tuple[float, float], end: tuple[float, float], width: float, rgb: Tone) -> None:
         """One straight stroke."""
