@@ -16,13 +16,6 @@ KEEP_COLOURS = {m.Keep.IN: "#57d69b", m.Keep.OUT: "#f25c5c"}
 Feature = dict[str, object]
 
 
-def origin_of(odometry: m.Odometry) -> LatLon | None:
-    """Latitude and longitude [deg] of the map's origin; None before the estimate knows where that lies."""
-    if not odometry.healthy or (odometry.latitude_deg, odometry.longitude_deg) == (0.0, 0.0):
-        return None
-    return geodetic_from_enu(-odometry.x_m, -odometry.y_m, odometry.latitude_deg, odometry.longitude_deg)
-
-
 def chart(route: m.Route | None, mission: m.Mission | None, origin: LatLon) -> bytes:
     """A foxglove.GeoJSON of what is known of both."""
     features: list[Feature] = []

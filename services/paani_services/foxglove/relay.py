@@ -16,8 +16,9 @@ from paani import messages as m
 from paani.bus import Picture
 from paani.config import Config
 from paani.logs import viewer
+from paani.map_origin import MapPlace, is_map_moved, map_origin_deg, map_place_of
 from paani_services.foxglove import channels, overlay, scene
-from paani_services.foxglove.chart import LatLon, chart, origin_of
+from paani_services.foxglove.chart import LatLon, chart
 from paani_services.foxglove.mask_colours import tint_mask
 from paani_services.foxglove.transforms import camera_calibration, transforms
 
@@ -37,6 +38,7 @@ class Relay:
         self._lines = viewer.Viewer()
         self._halves: collections.OrderedDict[tuple[str, int], m.Odometry] = collections.OrderedDict()
         self._origin: LatLon | None = config.localization.origin_lat_lon_deg
+        self._place: MapPlace | None = None
         self._route: m.Route | None = None
         self._mission: m.Mission | None = None
         self._draw: Mapping[str, Callable[[Any], None]] = {
@@ -93,8 +95,9 @@ class Relay:
     def _odometry(self, odometry: m.Odometry) -> None:
         self._pair(keys.ODOMETRY.name, keys.LOCAL_ODOMETRY.name, odometry)
         self._scene(scene.boat(odometry))
-        if self._origin is None and (origin := origin_of(odometry)) is not None:
-            self._origin = origin
+        place = map_place_of(odometry)
+        if place is not None and (self._place is None or is_map_moved(self._place, place)):
+            self._place, self._origin = place, map_origin_deg(place)
             self._chart()
 
     def _tracks(self, tracks: m.Tracks) -> None:

@@ -25,6 +25,7 @@ STATION_RADIUS_M = 4.0  # of an item that gives none, as in mission files
 PASSING_S = 0.1  # a waypoint that is no route with another is a station that is left at once
 CIRCLE_CORNERS = 32
 NOWHERE = (0, 0)  # the protocol's "here"
+KEEP_SPEED, DEFAULT_SPEED = -1.0, -2.0  # in the place of metres a second (MAV_CMD_DO_CHANGE_SPEED)
 
 WaypointOf = Callable[[tuple[int, int]], m.Waypoint]
 KEEPS = {
@@ -128,9 +129,7 @@ class _LegBuilder:
                     self.end_route()
                     self._add_station(seq, (here,), third, first)
             case dialect.MAV_CMD_DO_CHANGE_SPEED:
-                if second > 0.0 and second != self._speed_mps:
-                    self.end_route()
-                    self._speed_mps = second
+                self._change_speed(seq, second)
             case dialect.MAV_CMD_DO_JUMP:
                 self._repeat(seq, integer(first), integer(second))
             case dialect.MAV_CMD_NAV_LOITER_UNLIM | dialect.MAV_CMD_NAV_LOITER_TIME:
@@ -149,6 +148,16 @@ class _LegBuilder:
                 self._add(seq, m.MissionLeg(kind=m.LegKind.STOP))
             case _:
                 raise ItemError(seq, RESULT_UNSUPPORTED, f"the boat cannot do command {item.command}")
+
+    def _change_speed(self, seq: int, wanted_mps: float) -> None:
+        if wanted_mps == KEEP_SPEED or math.isnan(wanted_mps):
+            return
+        if not wanted_mps > 0.0 and wanted_mps != DEFAULT_SPEED:
+            raise ItemError(seq, dialect.MAV_MISSION_INVALID_PARAM2, f"{wanted_mps:g} is no speed")
+        speed_mps = max(wanted_mps, 0.0)  # the navigator's own is 0
+        if speed_mps != self._speed_mps:
+            self.end_route()
+            self._speed_mps = speed_mps
 
     def end_route(self) -> None:
         """The waypoints in a row so far are a route, which begins where the leg before ends."""

@@ -14,7 +14,7 @@ from paani.geometry import geodetic_from_enu
 from paani.map_origin import map_origin_deg
 from paani_services.mavlink.codec import dialect
 from paani_services.mavlink.fields import U16_MAX, degrees_e7
-from paani_services.mavlink.mission_items import Item, Legs
+from paani_services.mavlink.mission_items import DEFAULT_SPEED, Item, Legs
 from paani_services.mavlink.rover_modes import Mode, mode_of
 from paani_services.mavlink.snapshot import Snapshot
 from paani_services.mavlink.station import Source
@@ -67,9 +67,11 @@ def plan_of(snapshot: Snapshot, uploaded: Uploaded | None = None) -> Plan:
         return Plan({MISSION: uploaded.items, FENCE: fence_items, RALLY: rally_items}, uploaded.legs.seq_of)
     items = [Item(WAYPOINT, place_e7=place(home[0]) if home else (0, 0), frame=GLOBAL)]
     seq_of: dict[tuple[int, int], int] = {}
+    speed_mps = 0.0
     for number, leg in enumerate(legs):
-        if leg.speed_mps > 0.0:
-            items.append(Item(dialect.MAV_CMD_DO_CHANGE_SPEED, (1.0, leg.speed_mps, -1.0, 0.0)))
+        if leg.speed_mps != speed_mps:
+            speed_mps = leg.speed_mps
+            items.append(Item(dialect.MAV_CMD_DO_CHANGE_SPEED, (1.0, speed_mps or DEFAULT_SPEED, -1.0, 0.0)))
         seq_of.update({(number, each): len(items) + each for each in range(max(1, len(leg.waypoints)))})
         items += _leg_items(leg, len(items), place)
     return Plan({MISSION: tuple(items[:MAX_ITEMS]), FENCE: fence_items, RALLY: rally_items}, seq_of)

@@ -205,14 +205,24 @@ def gps_global_origin(snapshot: Snapshot) -> Any | None:
 
 
 def nav_controller_output(snapshot: Snapshot) -> Any | None:
-    """The heading that is ordered and the distance from the leg's line, positive to starboard."""
+    """The heading that is ordered, how far the waypoint is, and the leg's line, positive where that is to starboard."""
     command = snapshot.command
     if command is None or not command.enable:
         return None
     bearing_deg = round(heading_centidegrees(command.heading_rad) / 100.0) % 360
     return dialect.MAVLink_nav_controller_output_message(
-        NAN, NAN, bearing_deg, bearing_deg, U16_MAX, NAN, NAN, -command.cross_track_m
+        NAN, NAN, bearing_deg, bearing_deg, _waypoint_distance_m(snapshot, command), NAN, NAN, -command.cross_track_m
     )
+
+
+def _waypoint_distance_m(snapshot: Snapshot, command: m.NavCommand) -> int:
+    """How far the waypoint is that is steered for; `U16_MAX` where there is none, or no pose."""
+    legs = snapshot.legs or ()
+    waypoints = legs[command.leg_index].waypoints if command.leg_index < len(legs) else ()
+    if snapshot.pose is None or command.waypoint_index >= len(waypoints):
+        return U16_MAX
+    point = waypoints[command.waypoint_index]
+    return min(round(math.hypot(point.x_m - snapshot.pose.x_m, point.y_m - snapshot.pose.y_m)), U16_MAX - 1)
 
 
 def autopilot_version(_: Snapshot) -> Any:

@@ -7,10 +7,10 @@ from typing import Any
 import pytest
 
 from paani import messages as m
-from paani.geometry import enu_from_geodetic, geodetic_from_enu
+from paani.geometry import enu_from_geodetic
 from paani.logs import protobuf as pb
-from paani_services.foxglove.chart import chart, origin_of
-from tests.unit.paani_services.foxglove.seen import NOW_US, WAYPOINTS, as_json, decoded, odometry
+from paani_services.foxglove.chart import chart
+from tests.unit.paani_services.foxglove.seen import NOW_US, WAYPOINTS, as_json, decoded
 
 ORIGIN = (52.0, 4.0)
 
@@ -35,11 +35,3 @@ def test_fence_and_stations() -> None:
     assert fence["properties"]["name"] == "weir"
     assert fence["geometry"]["coordinates"][0] == fence["geometry"]["coordinates"][-1]
     assert station["geometry"] == {"type": "Point", "coordinates": [4.0, 52.0]}
-
-
-def test_the_origin_is_the_estimates() -> None:
-    latitude_deg, longitude_deg = geodetic_from_enu(12.0, -5.0, *ORIGIN)
-    found = origin_of(odometry(latitude_deg=latitude_deg, longitude_deg=longitude_deg))
-    assert found == pytest.approx(ORIGIN, abs=1e-8)
-    assert origin_of(odometry(healthy=False)) is None
-    assert origin_of(odometry(latitude_deg=0.0, longitude_deg=0.0)) is None

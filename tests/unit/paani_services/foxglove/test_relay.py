@@ -14,6 +14,7 @@ from paani import messages as m
 from paani.bus import Picture
 from paani.config import Config, FoxgloveConfig, LocalizationConfig, load_config
 from paani.errors import UserError
+from paani.geometry import geodetic_from_enu
 from paani.logs import protobuf as pb
 from paani_services.foxglove.channels import CALIBRATION as LENS
 from paani_services.foxglove.channels import CHART, CORRIDORS, DRAWN, MASK, SCENE, TRANSFORMS, channels
@@ -130,6 +131,23 @@ def test_the_chart_waits_for_an_origin() -> None:
     placed.relay.take(keys.ROUTE, route)
     [line] = as_json(decoded(pb.GEO_JSON, placed.on(CHART)[0]).geojson.encode())["features"]
     assert line["geometry"]["coordinates"][0] == [8.0, 50.0]
+
+
+def test_a_chart_moves_with_the_map() -> None:
+    """A boat that starts anew has its map elsewhere on Earth, and what it follows lies in that map."""
+    viewers = Viewers()
+    viewers.relay.take(keys.ROUTE, m.Route(source_us=NOW_US, name="r", waypoints=WAYPOINTS))
+    for origin in ((52.0, 4.0), (52.0, 4.0), (52.1, 4.0)):
+        latitude_deg, longitude_deg = geodetic_from_enu(12.0, -5.0, *origin)
+        viewers.relay.take(keys.ODOMETRY, odometry(latitude_deg=latitude_deg, longitude_deg=longitude_deg))
+        viewers.relay.take(
+            keys.ODOMETRY, odometry(latitude_deg=latitude_deg, longitude_deg=longitude_deg + 1.0, healthy=False)
+        )
+    [before], [after] = (as_json(decoded(pb.GEO_JSON, data).geojson.encode())["features"] for data in viewers.on(CHART))
+    for line, latitude_deg in ((before, 52.0), (after, 52.1)):
+        first_deg = line["geometry"]["coordinates"][0]
+        wanted = geodetic_from_enu(WAYPOINTS[0].x_m, WAYPOINTS[0].y_m, latitude_deg, 4.0)
+        assert first_deg[::-1] == pytest.approx(wanted, abs=1e-6)
 
 
 def test_nothing_is_said_between_messages() -> None:

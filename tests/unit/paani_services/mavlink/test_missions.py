@@ -52,7 +52,7 @@ def place_m(place_e7: tuple[int, int]) -> tuple[float, float]:
 def test_each_leg_becomes_items_of_the_protocol() -> None:
     """Home first, as ArduPilot has it; a speed stands before its leg, a repetition after it."""
     items = plan().items[MISSION]
-    assert [item.command for item in items] == [16, 19, 178, 16, 16, 16, 177, 17, 20, 176]
+    assert [item.command for item in items] == [16, 19, 178, 16, 16, 16, 177, 178, 17, 20, 176]
     assert items[0].frame == common.MAV_FRAME_GLOBAL
     assert {item.frame for item in items[1:]} == {common.MAV_FRAME_GLOBAL_RELATIVE_ALT}
     assert place_m(items[0].place_e7) == pytest.approx((HOME.x_m, HOME.y_m), abs=0.02)
@@ -61,8 +61,9 @@ def test_each_leg_becomes_items_of_the_protocol() -> None:
     assert items[1].parameters[:3] == (20.0, 0.0, 3.0)
     assert items[2].parameters == (1.0, 0.4, -1.0, 0.0)
     assert items[6].parameters[:2] == (3.0, 2.0)  # back to the route's first, twice more
-    assert (items[7].place_e7, items[8].place_e7) == ((0, 0), (0, 0))
-    assert items[9].parameters[:2] == (1.0, 4.0)
+    assert items[7].parameters == (1.0, -2.0, -1.0, 0.0)  # the speed that the boat would go by itself
+    assert (items[8].place_e7, items[9].place_e7) == ((0, 0), (0, 0))
+    assert items[10].parameters[:2] == (1.0, 4.0)
 
 
 def test_a_route_without_a_mission_goes_round_without_end() -> None:
@@ -96,7 +97,7 @@ def test_what_is_not_known_is_not_downloaded(unknown: dict[str, object]) -> None
 
 
 @pytest.mark.parametrize(
-    ("leg", "waypoint", "seq"), [(0, 0, 1), (1, 0, 3), (1, 2, 5), (2, 0, 7), (2, 9, 7), (4, 0, 9), (9, 9, 0)]
+    ("leg", "waypoint", "seq"), [(0, 0, 1), (1, 0, 3), (1, 2, 5), (2, 0, 8), (2, 9, 8), (4, 0, 10), (9, 9, 0)]
 )
 def test_the_item_that_is_steered_for(leg: int, waypoint: int, seq: int) -> None:
     order = m.NavCommand(
@@ -129,10 +130,10 @@ def test_how_far_the_mission_is() -> None:
     for nothing in (EMPTY, home_alone):
         current = mission_current(armed(), nothing)
         assert (current.total, current.mission_state) == (65_535, common.MISSION_STATE_NO_MISSION)
-    assert mission_current(armed(), plan()).total == 9  # home is none of them
+    assert mission_current(armed(), plan()).total == 10  # home is none of them
 
 
-@pytest.mark.parametrize("seq", [-1, 10, 65_535])
+@pytest.mark.parametrize("seq", [-1, 11, 65_535])
 def test_there_is_no_item_beyond_the_last(seq: int) -> None:
     assert mission_item(plan(), MISSION, seq, 0, (255, 190)) is None
 

@@ -199,4 +199,20 @@ def test_a_battery_is_told_where_one_is_measured() -> None:
 def test_the_ordered_heading_is_told_while_the_boat_is_ordered_to_move() -> None:
     order = sent(armed())["NAV_CONTROLLER_OUTPUT"]
     assert order.nav_bearing == round(90.0 - math.degrees(0.5))
+    assert order.wp_dist == 0xFFFF
     assert "NAV_CONTROLLER_OUTPUT" not in sent(in_order())
+
+
+@pytest.mark.parametrize(
+    ("leg", "waypoint", "distance_m"), [(1, 1, 50), (1, 2, 0xFFFE), (0, 0, 0xFFFF), (2, 0, 0xFFFF)]
+)
+def test_how_far_the_waypoint_is_that_is_steered_for(leg: int, waypoint: int, distance_m: int) -> None:
+    here = odometry()
+    places = [(0.0, 0.0), (here.x_m + 30.0, here.y_m - 40.0), (here.x_m, here.y_m + 90_000.0)]
+    points = tuple(m.Waypoint(x_m=x_m, y_m=y_m) for x_m, y_m in places)
+    legs = (m.MissionLeg(kind=m.LegKind.RETURN_HOME), m.MissionLeg(kind=m.LegKind.FOLLOW_ROUTE, waypoints=points))
+    order = m.NavCommand(
+        source_us=NOW_US, enable=True, heading_rad=0.5, speed_mps=0.6, leg_index=leg, waypoint_index=waypoint
+    )
+    mission = m.Mission(source_us=NOW_US, name="a", legs=legs)
+    assert sent(armed(command=order, mission=mission))["NAV_CONTROLLER_OUTPUT"].wp_dist == distance_m

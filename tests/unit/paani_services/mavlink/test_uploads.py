@@ -59,6 +59,7 @@ def test_what_the_boat_offers_comes_back_as_the_same_legs() -> None:
         m.MissionLeg(kind=FOLLOW, waypoints=POINTS, repeat=True, laps=3, speed_mps=0.4),
         m.MissionLeg(kind=HOLD, radius_m=2.0, speed_mps=0.4),
         m.MissionLeg(kind=m.LegKind.RETURN_HOME, waypoints=POINTS[1:2], speed_mps=0.4),
+        m.MissionLeg(kind=HOLD, waypoints=POINTS[:1], radius_m=3.0, duration_s=20.0),
         m.MissionLeg(kind=m.LegKind.STOP),
     )
     plan = plan_of(in_order(mission=m.Mission(source_us=1, name="a", legs=legs)))
@@ -84,6 +85,13 @@ def test_waypoints_in_a_row_are_a_route_and_a_speed_or_a_stay_ends_it() -> None:
     assert (legs[2].duration_s, seq_of[1, 0], seq_of[1, 2], seq_of[3, 1]) == (7.0, 1, 4, 5)
 
 
+def test_a_speed_is_kept_or_given_back_where_the_protocol_says_so() -> None:
+    speeds = [Item(178, (1.0, speed_mps, -1.0, 0.0), frame=2) for speed_mps in (0.5, -1.0, math.nan, -2.0)]
+    first, *others = (step for at, speed in zip((0, 1, 2, 0), speeds, strict=True) for step in (speed, waypoint(at)))
+    legs, _ = legs_of_items([first, *others, waypoint(1)], on_map)
+    assert [(leg.speed_mps, len(leg.waypoints)) for leg in legs] == [(0.5, 3), (0.0, 3)]
+
+
 def test_home_comes_first_in_a_frame_of_its_own_and_one_waypoint_alone_is_passed() -> None:
     home = waypoint(2, frame=HOME_FRAME)
     (there, back), _ = legs_of_items([home, waypoint(0), Item(20)], on_map)
@@ -104,6 +112,8 @@ def test_home_comes_first_in_a_frame_of_its_own_and_one_waypoint_alone_is_passed
         (Item(16), common.MAV_MISSION_INVALID_PARAM5_X),
         (Item(16, place_e7=(910_000_000, 0)), common.MAV_MISSION_INVALID_PARAM5_X),
         (Item(19, (math.nan, 0.0, 0.0, 0.0)), common.MAV_MISSION_INVALID_PARAM1),
+        (Item(178, (1.0, 0.0, -1.0, 0.0)), common.MAV_MISSION_INVALID_PARAM2),
+        (Item(178, (1.0, -3.0, -1.0, 0.0)), common.MAV_MISSION_INVALID_PARAM2),
     ],
 )
 def test_an_item_that_the_boat_cannot_do_is_refused_and_named(item: Item, result: int) -> None:
