@@ -1,6 +1,6 @@
 """WaterScenes in its official layout: lists, selection, mapping, refusals (R1 - R8)."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -41,6 +41,7 @@ def of(kind: int) -> Box:
 def test_the_seven_classes_map_to_four_r4() -> None:
     kinds = [box.kind for box in map_classes([of(k) for k in (PIER, BUOY, SAILOR, SHIP, BOAT, VESSEL, KAYAK)])]
     assert [DETECTOR_CLASSES[k] for k in kinds] == ["pier", "buoy", "person", "vessel", "vessel", "vessel", "vessel"]
+    assert (PIER, BUOY, SAILOR, SHIP, BOAT, VESSEL, KAYAK) == (0, 1, 2, 3, 4, 5, 6), "as the label files number them"
 
 
 def test_the_papers_constants_r1_r2() -> None:
@@ -75,6 +76,54 @@ def test_a_miniature_is_counted_by_split_r1_r3_r5_r6_r7(tmp_path: Path) -> None:
     raw = (tmp_path / "raw" / "detection" / "yolo").glob("*.txt")
     rows = {path.stem: len(path.read_text().splitlines()) for path in raw}
     assert [len(boxes) for boxes in kept] == [rows[Path(item.file).stem] for item in manifest.items]
+
+
+def test_r1_r2_ten_thousand_training_pictures_are_selected_with_seed_42(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[tuple[int, int]] = []
+
+    def select_noting(boxes: Mapping[str, Sequence[Box]], limit: int, seed: int) -> tuple[str, ...]:
+        asked.append((limit, seed))
+        return select_train(boxes, limit, seed)
+
+    monkeypatch.setattr("paani_models.datasets.waterscenes.select_train", select_noting)
+    prepare_waterscenes(waterscenes(tmp_path / "raw"), tmp_path / "out")
+    assert asked == [(10_000, 42)]
+
+
+def test_r1_every_validation_and_test_picture_is_kept_however_few_train(tmp_path: Path) -> None:
+    raw = waterscenes(tmp_path / "raw")
+    (raw / "train.txt").write_text("000001\n000002\n")
+    (raw / "val.txt").write_text("000003\n000004\n000007\n")
+    (raw / "test.txt").write_text("000005\n000006\n000008\n")
+    manifest, _ = prepare_waterscenes(raw, tmp_path / "out", train_images=1)
+    assert [(count.split, count.images) for count in count_boxes(manifest)] == [("train", 1), ("val", 3), ("test", 3)]
+
+
+@pytest.mark.parametrize("kind", sorted(RARE))
+def test_r2_a_picture_is_rare_by_any_of_its_boxes(kind: int) -> None:
+    boxes = {"a": [of(SHIP)], "b": [of(PIER), of(SHIP), of(kind)], "c": [of(BOAT), of(VESSEL)]}
+    assert select_train(boxes, 1) == ("b",)
+
+
+def test_r3_each_of_many_boxes_keeps_its_place_and_size(tmp_path: Path) -> None:
+    raw = waterscenes(tmp_path / "raw")
+    rows = [(3, 0.1 * place, 0.3, 0.04, 0.02 * place) for place in range(1, 9)]
+    (raw / "detection" / "yolo" / "000004.txt").write_text("".join("{} {} {} {} {}\n".format(*row) for row in rows))
+    prepare_waterscenes(raw, tmp_path / "out")
+    vessel = DETECTOR_CLASSES.index("vessel")
+    expected = [(vessel, x - w / 2, y - h / 2, x + w / 2, y + h / 2) for _, x, y, w, h in rows]
+    np.testing.assert_allclose(read_boxes(tmp_path / "out" / "labels" / "000004.txt"), expected, atol=1e-5)
+
+
+def test_u1_v2_validation_and_test_pictures_are_read_by_names_of_their_own(tmp_path: Path) -> None:
+    prepare_waterscenes(waterscenes(tmp_path / "raw"), tmp_path / "waterscenes")
+    held_out = {
+        name: [sample.picture.stem for sample in read_samples(tmp_path, choose_sources([name])) if sample.held_out]
+        for name in ("waterscenes", "waterscenes_test")
+    }
+    assert held_out == {"waterscenes": ["000007"], "waterscenes_test": ["000008"]}
 
 
 def test_a_prepared_set_is_trained_on_by_name_and_watched(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

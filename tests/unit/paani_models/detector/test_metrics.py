@@ -43,7 +43,28 @@ def test_edge_f1_tolerates_two_pixels_u4(shift: int, expected: float) -> None:
     truth, predicted = np.zeros((8, 32), np.uint8), np.zeros((8, 32), np.uint8)
     truth[:, 12:] = 1
     predicted[:, 12 + shift :] = 1
-    assert f1_score(*count_edge_matches(predicted, truth)) == pytest.approx(expected)
+    for ours, theirs in ((predicted, truth), (predicted.T, truth.T)):
+        assert f1_score(*count_edge_matches(ours, theirs)) == pytest.approx(expected)
+
+
+def test_u4_the_tolerance_is_euclidean() -> None:
+    """The boundary of one pixel is a cross of five; of another, two to the right and two down, two are within 2 px."""
+    truth, predicted = np.zeros((20, 20), np.uint8), np.zeros((20, 20), np.uint8)
+    truth[8, 8], predicted[10, 10] = 1, 1
+    assert count_edge_matches(predicted, truth) == (2, 5, 2, 5)
+
+
+def test_u4_edge_f1_is_the_harmonic_mean_of_precision_and_recall() -> None:
+    assert f1_score(1, 2, 1, 4) == pytest.approx(1 / 3)
+    assert f1_score(0, 2, 0, 4) == 0.0
+
+
+def test_u4_precision_is_of_the_predicted_edge_and_recall_of_the_true_one() -> None:
+    """Per row two true edge pixels; of the predicted, three beside them and two far away."""
+    truth, predicted = np.zeros((8, 32), np.uint8), np.zeros((8, 32), np.uint8)
+    truth[:, 12:] = 1
+    predicted[:, 12], predicted[:, 24:] = 1, 1
+    assert count_edge_matches(predicted, truth) == (8 * 3, 8 * 5, 8 * 2, 8 * 2)
 
 
 def test_average_precision_by_hand_u1() -> None:

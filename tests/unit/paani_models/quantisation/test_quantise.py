@@ -173,6 +173,20 @@ def test_the_papers_recipe_is_signed_per_tensor_qdq_t4(tmp_path: Path) -> None:
     assert zero_types <= {TensorProto.INT8, TensorProto.INT32}, "biases are 32 bits wide"
 
 
+@pytest.mark.slow
+def test_t4_the_input_is_scaled_by_the_least_and_the_greatest_of_all_calibration_pictures(tmp_path: Path) -> None:
+    """The last of 200 has both."""
+    small_net(tmp_path / "net.onnx")
+    samples = inputs(200)
+    samples[-1] = samples[-1] * np.float32(8.0)
+    quantise_network(tmp_path / "net.onnx", tmp_path / "net8.onnx", PAPER, samples)
+    graph = onnx.load(str(tmp_path / "net8.onnx")).graph
+    stored = {tensor.name: numpy_helper.to_array(tensor) for tensor in graph.initializer}
+    [first] = [node for node in graph.node if node.op_type == "QuantizeLinear" and node.input[0] == "input"]
+    widest = max(sample.max() for sample in samples) - min(sample.min() for sample in samples)
+    assert float(stored[first.input[1]]) == pytest.approx(widest / 255, rel=1e-4)
+
+
 def test_a_fully_quantised_detector_goes_blind_and_is_rejected(tmp_path: Path) -> None:
     """Boxes up to 320 and scores up to 1 share one step, of more than 1: scores are 0, or no scores."""
     net, samples = verified_path("detector"), [detector_input(river(seed), (416, 320)) for seed in range(3)]
@@ -289,9 +303,11 @@ def test_calibration_takes_200_sorted_training_pictures_t4() -> None:
         choose_calibration_samples(drawn, None, spread=False)
 
 
-@pytest.mark.parametrize("leaked", [sample("v.jpg", "b", True), sample("w.jpg", "b", False)])
+@pytest.mark.parametrize(
+    "leaked", [sample("v.jpg", "b", True), sample("w.jpg", "b", False), sample("v.jpg", "c", False, "lake")]
+)
 def test_a_candidate_calibrated_on_validation_pictures_is_refused_t6(tmp_path: Path, leaked: Sample) -> None:
-    """The picture itself, or another of its sequence."""
+    """The picture itself, another of its sequence, or itself where another source trains on it."""
     samples = [sample("t.jpg", "a", False), sample("v.jpg", "b", True), leaked]
     listed = tmp_path / "list.txt"
     listed.write_text(f"/pictures/t.jpg\n{leaked.picture}\n")

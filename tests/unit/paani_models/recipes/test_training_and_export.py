@@ -110,6 +110,31 @@ def test_the_recorded_edge_f1_is_that_of_the_labels_s10(tmp_path: Path, river: l
         assert training.validate()["edge_f1"] == edge_f1
 
 
+@pytest.mark.slow
+def test_s10_u3_each_class_has_the_iou_of_its_own_and_miou_is_their_mean(
+    tmp_path: Path, river: list[CachedPicture]
+) -> None:
+    """A net that says water everywhere: water has its share of the pixels, obstacle and sky nothing."""
+    training = segmenter_run(tmp_path, river)
+    training.state.average.model.forward = lambda x: torch.zeros(len(x), 3, 64, 64)
+    figures = training.validate()
+    masks = np.stack([cv2.resize(p.mask, (64, 64), interpolation=cv2.INTER_NEAREST) for p in training.held_out])
+    assert figures["water"] == pytest.approx((masks == 0).mean(), abs=1e-4)
+    assert (figures["obstacle"], figures["sky"]) == (0.0, 0.0)
+    assert figures["miou"] == pytest.approx(figures["water"] / 3, abs=1e-4)
+
+
+@pytest.mark.slow
+def test_s9_best_is_the_epoch_of_the_highest_miou(tmp_path: Path, river: list[CachedPicture]) -> None:
+    training = segmenter_run(tmp_path, river)
+    figures = iter(({"miou": 0.5, "edge_f1": 0.1, "water": 0.1}, {"miou": 0.4, "edge_f1": 0.9, "water": 0.9}))
+    training.validate = lambda: next(figures)
+    training.run()
+    assert (load_checkpoint(tmp_path / "best.pt")["epoch"], load_checkpoint(tmp_path / "last.pt")["epoch"]) == (1, 2)
+    rows = (tmp_path / "epochs.jsonl").read_bytes().splitlines()
+    assert [msgspec.json.decode(row)["epoch"] for row in rows] == [1, 2]
+
+
 def test_an_epoch_of_the_paper_shows_every_picture_once_by_its_own_augmentation_s7_s8(
     tmp_path: Path, river: list[CachedPicture]
 ) -> None:

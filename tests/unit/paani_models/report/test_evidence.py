@@ -1,5 +1,6 @@
 """Four classes of evidence stay apart (U7)."""
 
+from itertools import combinations
 from pathlib import Path
 
 import msgspec
@@ -19,10 +20,10 @@ def test_there_are_four_classes_u7() -> None:
     assert [len(found) for found in split.values()] == [1, 0, 0, 1]
 
 
-@pytest.mark.parametrize("other", [kind for kind in Evidence if kind is not Evidence.LABELLED])
-def test_two_classes_are_never_pooled_u7(other: Evidence) -> None:
+@pytest.mark.parametrize(("one", "other"), list(combinations(Evidence, 2)))
+def test_two_classes_are_never_pooled_u7(one: Evidence, other: Evidence) -> None:
     with pytest.raises(ValueError, match="cannot pool"):
-        pool_findings([finding(Evidence.LABELLED), finding(other)])
+        pool_findings([finding(one), finding(other)])
 
 
 def test_one_class_pools_by_count() -> None:

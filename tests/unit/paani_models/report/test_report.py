@@ -141,9 +141,10 @@ def test_four_sections_that_do_not_mix_u7() -> None:
     assert all("water IoU" not in body for _, body in parts[1:])
 
 
-def test_an_evaluation_of_another_class_is_refused_u7() -> None:
-    with pytest.raises(ValueError, match="board_logs"):
-        page(PageContent(msgspec.structs.replace(evaluation(), evidence=Evidence.BOARD)))
+@pytest.mark.parametrize("other", [kind for kind in Evidence if kind is not Evidence.LABELLED])
+def test_an_evaluation_of_another_class_is_refused_u7(other: Evidence) -> None:
+    with pytest.raises(ValueError, match=other):
+        page(PageContent(msgspec.structs.replace(evaluation(), evidence=other)))
 
 
 def test_what_was_not_given_is_said() -> None:

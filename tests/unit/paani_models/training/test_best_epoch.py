@@ -44,3 +44,18 @@ def test_a_resumed_run_draws_what_an_unbroken_one_draws_s11(tmp_path: Path) -> N
     torch.manual_seed(999)
     TrainingState(torch.nn.Linear(1, 1, bias=False), 1e-3, 0.0).resume(tmp_path, {})
     assert torch.equal(torch.rand(4), unbroken)
+
+
+@pytest.mark.slow
+def test_s11_what_is_trained_beside_the_model_is_resumed_too(tmp_path: Path) -> None:
+    """The part that a distillation trains."""
+
+    def state(weight: float) -> TrainingState:
+        beside = torch.nn.Linear(1, 1, bias=False)
+        torch.nn.init.constant_(beside.weight, weight)
+        return TrainingState(torch.nn.Linear(1, 1, bias=False), 1e-3, 0.0, beside)
+
+    state(0.25).finish_epoch(tmp_path, {}, 0.5)
+    resumed = state(0.75)
+    resumed.resume(tmp_path, {})
+    assert resumed.extra.state_dict()["weight"].item() == 0.25

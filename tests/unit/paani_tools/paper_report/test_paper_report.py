@@ -144,7 +144,8 @@ def test_what_the_papers_detector_reaches_here_is_said_beside_the_papers_figures
         assert here[f"AP50-95, {label}"] == over.value
         all_n, drawn_n = all_n + over.n, drawn_n + drawn.n
     assert f"on {all_n:,} boxes, {drawn_n:,} of them" in SAYS["V1"]
-    assert "16 of its recipe's 60 epochs" in table.note
+    assert "16 of its recipe's 60 epochs, from random weights, not COCO's, and without rendered" in table.note
+    assert f"on {len({origin.name for origin in detector.origins})} other sources" in SAYS["V1"]
     assert not any(origin.name == "rendered" for origin in detector.origins)
 
 
@@ -230,8 +231,16 @@ def test_each_of_the_papers_figures_stands_in_its_own_place() -> None:
         {row: text.split(" / ") for row, _, text in published.DETECTOR_OTHERS},
     )
     assert "mAP50 {} and mAP50-95 {}".format(*others["V3"]) in SAYS["V3"]
-    test, onnx = others["V6"]
-    assert f"{validation['pier']:.6f} on validation, {test} on test and {onnx} with the ONNX file" in SAYS["V6"]
+    assert f"mAP50 {published.DETECTOR_AP50:.6f} and mAP50-95 {validation['mean']:.6f}" in SAYS["V1"]
+    assert "mAP50 {} and mAP50-95 {}".format(*others["V2"]) in SAYS["V2"]
+    named = {row: what for row, what, _ in published.DETECTOR_OTHERS}
+    for label in CLASSES:
+        row = published.DETECTOR_STATEMENTS[label]
+        test, onnx = others[row]
+        assert f"For {label} the paper's AP50-95 is {validation[label]:.6f} on validation, " in SAYS[row]
+        assert f"{test} on test and {onnx} with the ONNX file" in SAYS[row]
+        assert named[row] == f"AP50-95, {label}, test / ONNX"
+    assert f"{published.DETECTOR_NETWORK[3]} (detector) and {published.SEGMENTER_NETWORK[3]} (segmenter)" in SAYS["T2"]
     found = published.SEGMENTER
     assert (
         f"mIoU {found['miou']:.6f}, IoU {found['iou_water']:.6f} for water, {found['iou_obstacle']:.6f} for obstacle"
