@@ -105,6 +105,25 @@ def test_b8_b9_b10_who_judges_what() -> None:
     assert controller.outputs == (keys.THRUST,)
 
 
+def test_y1_each_interface_has_its_producer_and_those_who_decide_by_it() -> None:
+    """B1, B5, B9 - B12, and the estimate that navigator and controller go by."""
+    found = {
+        topic.name: (topic.producer, {name for name, decider in deciders().items() if topic in decider.inputs})
+        for topic in (
+            keys.PICTURE, keys.EVIDENCE, keys.TRACKS, keys.ADVISORY, keys.COMMAND, keys.THRUST, keys.ODOMETRY,
+        )
+    }  # fmt: skip
+    assert found == {
+        "camera/picture": ("camera", set()),
+        "perception/evidence": ("perception", {"advisor", "navigator"}),
+        "advisor/tracks": ("advisor", {"navigator"}),
+        "advisor/advisory": ("advisor", {"navigator"}),
+        "navigator/command": ("navigator", {"controller"}),
+        "controller/thrust": ("controller", set()),
+        "localization/odometry": ("localization", {"advisor", "navigator", "controller"}),
+    }
+
+
 @pytest.mark.parametrize("graph", GRAPHS)
 def test_a_topic_has_one_writer_in_a_graph_and_it_is_there(graph: Graph) -> None:
     rights = written(graph)

@@ -91,6 +91,15 @@ def test_the_papers_split_and_a_hulls() -> None:
     assert keys.ARMING.producer in services_on(Side.HOST, Graph.HULL)
 
 
+@pytest.mark.parametrize("graph", [Graph.SIMULATION, Graph.HIL])
+def test_x2_the_board_sees_and_advises_and_the_host_estimates_and_applies_the_thrust(graph: Graph) -> None:
+    board, host = ({topic.name for topic in topics_sent(side, graph)} for side in SIDES)
+    assert {"camera/picture", "perception/evidence", "advisor/tracks", "advisor/advisory"} <= board - host
+    assert {"sensors/gps", "sensors/imu", "localization/odometry", "controller/thrust"} <= host - board
+    assert "plant/thrust_applied" in host - board
+    assert [topic.name for topic in keys.TOPICS if topic.producer == "bridge"] == ["bridge/state"]
+
+
 @pytest.mark.parametrize("graph", Graph)
 @pytest.mark.parametrize("side", SIDES)
 def test_the_link_lets_in_what_the_other_side_may_write(side: Side, graph: Graph, runtime: str) -> None:

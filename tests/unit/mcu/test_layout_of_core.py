@@ -67,8 +67,16 @@ def test_a4_the_microcontroller_serves_four_calls_and_no_other() -> None:
         "paani_esc": "ESC_BYTES",
         "paani_status": "0",
     }
-    provided = re.findall(r'Bridge\.provide_safe\("(\w+)"', SKETCH.read_text(encoding="utf-8"))
-    assert set(provided) == set(served)
+    sketch = SKETCH.read_text(encoding="utf-8")
+    provided = re.findall(r'Bridge\.(\w+)\("(\w+)"', sketch)
+    assert sorted(provided) == sorted([("notify", "paani_mcu"), *(("provide_safe", name) for name in served)])
+
+
+def test_w9_an_open_stop_loop_is_what_the_sketch_reads_as_a_stop() -> None:
+    """W9 as far as its text says it: pulled up, so that a button that opens the loop or a broken wire reads high."""
+    sketch = SKETCH.read_text(encoding="utf-8")
+    assert re.findall(r"pinMode\(STOP_LOOP_PIN, (\w+)\);", sketch) == ["INPUT_PULLUP"]
+    assert re.findall(r"inputs\.estop = (.*);", sketch) == ["digitalRead(STOP_LOOP_PIN) == HIGH"]
 
 
 @pytest.mark.slow

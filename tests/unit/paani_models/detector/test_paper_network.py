@@ -283,10 +283,22 @@ def test_training_overfits_four_pictures_s4(tmp_path: Path, monkeypatch: pytest.
     monkeypatch.setattr(train_paper_network, "SIZE_WH", (160, 128))
     small_run(tmp_path, 12).run()
     rows = [msgspec.json.decode(line) for line in (tmp_path / "epochs.jsonl").read_bytes().splitlines()]
+    assert [row["epoch"] for row in rows] == list(range(1, 13))
     totals = [sum(row[part] for part in ("box_loss", "score_loss", "bins_loss")) for row in rows]
     assert totals[-1] < 0.5 * totals[0]
     assert {"person", "vessel", "pier", "buoy", "score", "epoch"} <= rows[-1].keys()
     assert rows[-1]["score"] > 0.5
+
+
+@pytest.mark.parametrize(
+    ("gain", "name"), [("BOX_GAIN", "box_loss"), ("SCORE_GAIN", "score_loss"), ("BINS_GAIN", "bins_loss")]
+)
+def test_x4_each_loss_of_an_epoch_is_recorded_by_its_name(
+    gain: str, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(paper_loss, gain, 0.0)
+    losses = small_run(tmp_path, 1)._train_epoch()
+    assert {part for part, value in losses.items() if value > 0.0} == {"box_loss", "score_loss", "bins_loss"} - {name}
 
 
 def test_a_resumed_run_equals_an_unbroken_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -43,6 +43,8 @@ def test_w8_every_seed_learns_and_gives_its_own_network(tmp_path: Path, monkeypa
     assert all(curve[-1] < curve[0] for curve in found.values())
     assert len({tuple(curve) for curve in found.values()}) == 3
     assert losses("again", 2) == found[2]
+    orders = [train.draw_epoch(pictures, replace(RECIPE, seed=seed), 0) for seed in (1, 2, 3)]
+    assert len({tuple(order) for order in orders}) == 3
 
 
 def test_z4_the_spread_of_six_is_stated() -> None:

@@ -22,6 +22,7 @@ from paani.config import PerceptionConfig, load_config
 from paani.config.perception import WeightSet
 from paani.errors import UserError
 from paani_models.catalogue import OTHER_SETS, load_catalogue, verified_path
+from paani_services.perception import pipeline
 from paani_services.perception.box_decoding import LABELS
 from paani_services.perception.corridors import summarise_corridors
 from paani_services.perception.engine import OnnxEngine, network_path
@@ -169,6 +170,30 @@ def test_b5_each_group_of_fields_has_its_own_content(monkeypatch: pytest.MonkeyP
     assert len({times.detector_ms, times.segmenter_ms, times.gate_ms, times.decode_ms, times.inference_ms}) == 5
     assert times.segmenter_run_ms <= times.segmenter_ms
     assert times.detector_ms + times.segmenter_ms <= times.inference_ms
+
+
+@pytest.mark.slow
+def test_v18_a_networks_time_has_its_preprocessing_and_decoding_and_the_segmenters_run_has_not(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """On a clock that each step moves on by a time of its own."""
+    elapsed_ms = 0.0
+
+    def lasting(step_ms: float, step: Callable[..., Any]) -> Callable[..., Any]:
+        def run_step(*arguments: Any) -> Any:
+            nonlocal elapsed_ms
+            elapsed_ms += step_ms
+            return step(*arguments)
+
+        return run_step
+
+    eyes = Perceiver(load_config(profile="paper").perception, lambda: elapsed_ms)
+    monkeypatch.setattr(OnnxEngine, "run", lasting(10.0, OnnxEngine.run))
+    before, after = {"letterbox_picture": 1.0, "stretch_picture": 2.0}, {"decode_boxes": 100.0, "classify_cells": 200.0}
+    for name, step_ms in (before | after).items():
+        monkeypatch.setattr(pipeline, name, lasting(step_ms, getattr(pipeline, name)))
+    times = eyes.perceive(river(), HEADER, 0.0)[0].timing
+    assert (times.detector_ms, times.segmenter_ms, times.segmenter_run_ms) == (111.0, 212.0, 10.0)
 
 
 @pytest.mark.slow

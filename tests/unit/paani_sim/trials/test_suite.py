@@ -189,6 +189,31 @@ def test_figures_have_what_the_scoring_reads() -> None:
     assert text.startswith("development seeds: 2; drives: 4\n")
 
 
+def test_w6_a_drive_that_does_not_recover_from_its_fault_counts_as_none() -> None:
+    late = Reaction(fault="camera_black", at_s=9.0, noticed_s=0.1, zero_thrust_s=0.9, rest_s=3.0, in_time=False)
+    good = msgspec.structs.replace(late, zero_thrust_s=0.3, rest_s=2.0, in_time=True)
+    lost = msgspec.structs.replace(RESULT, completed=False, why=DriveOutcome.TIME_LIMIT, collisions=1)
+    drives = {1: (RESULT, good), 2: (lost, late), 3: (lost, late)}
+    summary = summarise_suite(
+        "quick",
+        {
+            TrialCase("lake", seed, Policy.PAANI, "camera_black"): msgspec.structs.replace(drive, reactions=(reaction,))
+            for seed, (drive, reaction) in drives.items()
+        },
+    )
+    figures = summary.faults["camera_black"]
+    assert (figures.trials, figures.completed, figures.collisions) == (3, 1, 2)
+    assert (figures.judged, figures.in_time) == (3, 1)
+    assert (figures.worst_zero_thrust_s, figures.worst_rest_s) == (0.9, 3.0)
+
+
+def test_w7_a_policy_differs_from_the_default_one_in_its_evidence_and_planner_alone() -> None:
+    for policy in (Policy.ORACLE, Policy.BENDY_RULER, Policy.DWA, Policy.VO):
+        assert load_policy_config(policy) == load_policy_config(Policy.PAANI)
+    without = load_policy_config(Policy.PAANI, ["navigator.planner.use=false"])
+    assert load_policy_config(Policy.BLIND) == without != load_policy_config(Policy.PAANI)
+
+
 def test_figures_of_people_and_of_several_parts_say_so() -> None:
     met = msgspec.structs.replace(RESULT.encounters[0], kind="person")
     near = msgspec.structs.replace(RESULT, encounters=(met, msgspec.structs.replace(met, clearance_m=1.5)))

@@ -1,5 +1,6 @@
 """Sweeps: the cases, the worlds that they are driven in, and the figures."""
 
+import dataclasses
 import xml.etree.ElementTree as ET
 from collections import Counter
 from pathlib import Path
@@ -32,7 +33,7 @@ def test_a_sweep_drives_every_case_at_every_value_and_none_with_a_fault() -> Non
 
 
 @pytest.mark.slow
-def test_only_the_condition_of_a_world_changes() -> None:
+def test_w7_only_the_condition_of_a_world_changes() -> None:
     plain = build_scenario(TrialCase("river", 3, Policy.BLIND))
     for name, condition in CONDITIONS.items():
         swept = build_scenario(TrialCase("river", 3, Policy.BLIND, swept=f"{name}={condition.most:g}")).world
@@ -42,6 +43,8 @@ def test_only_the_condition_of_a_world_changes() -> None:
             part for part in ("current", "wind", "light", "waves") if getattr(swept, part) != getattr(plain.world, part)
         ]
         assert len(parts) == 1, name
+        before, after = (dataclasses.asdict(getattr(world, parts[0])) for world in (plain.world, swept))
+        assert sum(after[field] != value for field, value in before.items()) == 1, name
         assert condition.most == pytest.approx(
             {
                 "current_mps": swept.current.speed_mps,

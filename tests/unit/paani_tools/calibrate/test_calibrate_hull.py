@@ -89,7 +89,9 @@ def test_a_recording_becomes_a_vessel_and_settings(
     assert "std error" in printed
     found, base = load_vessel(str(out)), load_vessel("paper")
     assert found.drag.surge_quadratic == pytest.approx(20.0, rel=0.15)
-    assert found.drag.surge_quadratic != base.drag.surge_quadratic
+    for name in ("surge_linear", "surge_quadratic", "yaw_linear", "yaw_quadratic"):
+        assert getattr(found.drag, name) != getattr(base.drag, name), name
+    assert found.hull.yaw_inertia_kgm2 != base.hull.yaw_inertia_kgm2
     assert (found.buoyancy, found.windage, found.hull.mass_kg) == (base.buoyancy, base.windage, 12.4)
     assert "surge_linear" in out.read_text()
     assert "standard error" in out.read_text()

@@ -120,6 +120,35 @@ def test_v17_v18_v20_stage_times_are_of_distinct_results_by_the_papers_rule() ->
     assert figures.frame_age_s.median == pytest.approx(0.602)
 
 
+def test_v18_a_picture_that_no_network_saw_has_no_time_of_one() -> None:
+    run = polls(5, 1.0)
+    for number in (0, 1, 2):
+        seen = run[number].status
+        assert seen is not None
+        assert seen.evidence is not None
+        refused = replace(seen.evidence, usable=False, timing=m.InferenceTiming(total_ms=3.0))
+        run[number] = replace(run[number], status=replace(seen, evidence=refused))
+    figures = board_figures(run, 5)
+    assert figures.detector_ms == spread([203.0, 204.0])
+    assert figures.segmenter_run_ms == spread([153.0, 154.0])
+    assert (figures.unusable, figures.pipeline_ms.samples) == (3, 5)
+
+
+def test_v19_rates_go_on_after_a_restart_that_numbers_anew() -> None:
+    run = polls(40, 2.0)
+    for number in range(20, 40):
+        seen = run[number].status
+        assert seen is not None
+        assert seen.evidence is not None
+        assert seen.picture is not None
+        evidence = replace(seen.evidence, epoch=6, seq=seen.evidence.seq - 10)
+        picture = replace(seen.picture, frame_epoch=10, frame_seq=seen.picture.frame_seq - 52)
+        run[number] = replace(run[number], status=replace(seen, evidence=evidence, picture=picture))
+    figures = board_figures(run, 40)
+    assert figures.cadence_hz == pytest.approx(0.5)
+    assert figures.captured_hz == pytest.approx(2.58, abs=0.03)
+
+
 def test_v21_machine_figures_are_of_polls() -> None:
     figures = board_figures(polls(10, 2.0), 10)
     assert figures.cpu_percent == spread([25.0] * 9)
@@ -161,6 +190,7 @@ def test_v22_failures_stale_advice_kills_and_throttling_are_counted() -> None:
         (ADVISORY, 2.9, True),
         (None, 0.0, True),
         (replace(ADVISORY, reason=m.Reason.STALE_EVIDENCE), 0.0, True),
+        (replace(ADVISORY, reason=m.Reason.FUTURE_EVIDENCE), 0.0, True),
         (replace(ADVISORY, reason=m.Reason.NO_EVIDENCE), 0.0, True),
     ],
 )
@@ -201,6 +231,7 @@ def test_the_table_stands_beside_the_papers_column() -> None:
     assert rows["polls with learned segmentation"][:2] == ("300", "300")
     assert rows["polls with stale advice"][:2] == ("0", "0")
     assert (rows["OOM kills"][0], rows["CPU quota throttling"][0]) == ("0", "0")
+    assert rows["power"][:2] == ("unavailable", None)
     assert "test bench" in table.name
     assert NOT_THE_BOARD in table.note
     assert NOT_THE_BOARD not in board_table(run_of(polls(3, 2.0), 3, {}, replace(MACHINE, is_board=True))).note
