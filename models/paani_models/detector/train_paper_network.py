@@ -21,6 +21,7 @@ from paani_models.training.training_state import (
     Prefetch,
     TrainingState,
     append_record,
+    deterministic_algorithms,
     learning_rate,
     mixed_precision,
     to_device,
@@ -78,13 +79,14 @@ class Yolo11nTraining:
         recipe = asdict(self.recipe)
         self.state.resume(self.folder, recipe)
         last = self.recipe.epochs if until is None else until
-        while self.state.epoch < last and self._since_best() < self.recipe.patience:
-            losses = self._train_epoch()
-            figures = figures_by_class(self.state.average.model, self.held_out, SIZE_WH)
-            score = round(mean_ap50(figures), 4)
-            row = {"epoch": self.state.epoch + 1, "score": score, **losses, **figures}
-            append_record(self._records(), row)
-            self.state.finish_epoch(self.folder, recipe, score)
+        with deterministic_algorithms():
+            while self.state.epoch < last and self._since_best() < self.recipe.patience:
+                losses = self._train_epoch()
+                figures = figures_by_class(self.state.average.model, self.held_out, SIZE_WH)
+                score = round(mean_ap50(figures), 4)
+                row = {"epoch": self.state.epoch + 1, "score": score, **losses, **figures}
+                append_record(self._records(), row)
+                self.state.finish_epoch(self.folder, recipe, score)
 
     def _records(self) -> Path:
         return self.folder / "epochs.jsonl"

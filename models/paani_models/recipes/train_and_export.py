@@ -153,11 +153,7 @@ def _batch(options: TrainingOptions, usual: int) -> int:
 
 def _train_segmenter(net: str, pictures: PictureSelection, options: TrainingOptions) -> None:
     recipe = segmenter_recipe(net, options)
-    torch.manual_seed(recipe.seed)
-    model: ShippedSegmenter | PaperSegmenter = PaperSegmenter()
-    if net == "segmenter":
-        model = ShippedSegmenter()
-        load_imagenet_encoder(model, pictures.data / IMAGENET_FILE)
+    model = start_segmenter(net, pictures.data, recipe.seed)
     samples, distillation = pictures.segmented_samples(held_out=False), None
     if options.teacher is not None:
         teacher = ShippedSegmenter()
@@ -179,6 +175,16 @@ def _train_segmenter(net: str, pictures: PictureSelection, options: TrainingOpti
     elif options.start is not None:
         training.state.start_from(options.start)
     training.run()
+
+
+def start_segmenter(net: str, data: Path, seed: int) -> ShippedSegmenter | PaperSegmenter:
+    """The segmenter that a training begins with: random weights of `seed`, the shipped one's encoder ImageNet's."""
+    torch.manual_seed(seed)
+    if net != "segmenter":
+        return PaperSegmenter()
+    model = ShippedSegmenter()
+    load_imagenet_encoder(model, data / IMAGENET_FILE)
+    return model
 
 
 def _train_detector(pictures: PictureSelection, options: TrainingOptions) -> None:
@@ -239,13 +245,19 @@ def _load_detector(model: Detector, path: Path) -> None:
 def _train_yolo11n(pictures: PictureSelection, options: TrainingOptions) -> None:
     recipe = Yolo11nRecipe()
     recipe = replace(recipe, epochs=options.epochs or recipe.epochs, peak_rate=options.peak_rate or recipe.peak_rate)
-    torch.manual_seed(recipe.seed)
-    model = Yolo11n()
-    if options.start is not None:
-        load_averaged_weights(model, options.start)
+    model = start_yolo11n(recipe.seed, options.start)
     cached = read_boxed_pictures(pictures.boxed_samples(held_out=False))
     held_out = read_boxed_pictures(pictures.boxed_samples(held_out=True))
     Yolo11nTraining(model, recipe, options.folder, cached, held_out).run()
+
+
+def start_yolo11n(seed: int, start: Path | None) -> Yolo11n:
+    """The paper-shaped detector that a training begins with: the weights of `start`, or random ones of `seed`."""
+    torch.manual_seed(seed)
+    model = Yolo11n()
+    if start is not None:
+        load_averaged_weights(model, start)
+    return model
 
 
 def _train_image_quality(pictures: PictureSelection, options: TrainingOptions) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 from collections.abc import Callable, Iterator, Mapping
@@ -140,7 +141,7 @@ class TrainingState:
         self.optimiser = torch.optim.AdamW([g for g in groups if g["params"]], peak_rate, weight_decay=weight_decay)
         self.epoch = 0
         self.step = 0
-        self.best = 0.0
+        self.best = -math.inf
 
     def start_from(self, checkpoint: Path) -> None:
         """Take the averaged weights of another run. Raises UserError where they do not fit."""
@@ -164,9 +165,9 @@ class TrainingState:
         self.step += 1
 
     def finish_epoch(self, folder: Path, recipe: dict[str, Any], score: float) -> None:
-        """Count the epoch and save `last.pt`, and `best.pt` if no epoch scored higher."""
+        """Count the epoch and save `last.pt`, and `best.pt` if it scored higher than every epoch before."""
         self.epoch += 1
-        is_best = score >= self.best
+        is_best = score > self.best
         self.best = max(self.best, score)
         state = {
             "model": self.model.state_dict(),
@@ -231,6 +232,16 @@ def mixed_precision() -> torch.autocast:
     """S4: bfloat16 where the device has instructions for it, which halves a step; else all stays float32."""
     device = training_device().type
     return torch.autocast(device, torch.bfloat16, enabled=device == "cuda" or _multiplies_bfloat16())
+
+
+@contextlib.contextmanager
+def deterministic_algorithms() -> Iterator[None]:
+    """S4: operations take the algorithm that repeats its result; what has none warns and goes on."""
+    torch.use_deterministic_algorithms(True, warn_only=True)
+    try:
+        yield
+    finally:
+        torch.use_deterministic_algorithms(False)
 
 
 def _multiplies_bfloat16() -> bool:

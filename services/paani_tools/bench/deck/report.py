@@ -8,6 +8,7 @@ from statistics import linear_regression
 import msgspec
 import numpy as np
 
+from paani.statistics.order_statistics import nearest_rank
 from paani_tools.bench.deck.loads import PageLoad
 from paani_tools.up.run_summary import Percentiles
 
@@ -85,8 +86,9 @@ def ratio_of_medians(numerator: Sequence[float], denominator: Sequence[float]) -
         np.median(draw.choice(np.asarray(side, np.float64), (RESAMPLED, len(side))), axis=1)
         for side in (numerator, denominator)
     )
-    low, high = np.quantile(above / below, (0.5 - WITHIN / 2, 0.5 + WITHIN / 2))
-    return Ratio(float(np.median(numerator) / np.median(denominator)), float(low), float(high))
+    ratios = (above / below).tolist()
+    low, high = (nearest_rank(ratios, 50.0 + side * WITHIN / 2) for side in (-100.0, 100.0))
+    return Ratio(float(np.median(numerator) / np.median(denominator)), low, high)
 
 
 def keeps_crowd_bars(report: DeckReport) -> tuple[bool, bool]:

@@ -18,6 +18,7 @@ from scipy.stats import t as student
 
 from paani.arrays import F64
 from paani.errors import UserError
+from paani.statistics.order_statistics import nearest_rank
 from paani_sim.vessels import Vessel
 from paani_tools.calibrate.hull.drive import STEP_S, Drive
 from paani_tools.calibrate.hull.model import INDEX, PARAMETERS, Prediction, fan_force_n, initial_parameters, predict
@@ -112,11 +113,11 @@ def identify(drive: Drive, vessel: Vessel, force_per_unit_n: float) -> Identific
 def _identify(drive: Drive, vessel: Vessel, start: F64, fixed: set[str]) -> Identification:
     free = [number for name, number in INDEX.items() if name not in fixed]
     fit = _fit(drive, vessel, start, free)
-    fastest = tuple(np.percentile(np.abs(fit.motion), FASTEST_PERCENT, axis=0).tolist())
+    fastest = tuple(nearest_rank(motion, FASTEST_PERCENT) for motion in np.abs(fit.motion).T.tolist())
     errors = dict(zip(free, fit.std_errors, strict=True))
     width = student.ppf(0.5 + 0.5 * CONFIDENCE, max(1, fit.blocks - len(free)))
     thrust = np.abs(drive.thrust)
-    most = float(np.percentile(thrust[thrust > 0.0], FASTEST_PERCENT))
+    most = nearest_rank(thrust[thrust > 0.0].tolist(), FASTEST_PERCENT)
     forces = _force_scales(fit.parameters, (most, *fastest))
     estimates = {}
     for name, number in INDEX.items():

@@ -22,7 +22,8 @@ from paani_models.detector.paper_data import (  # noqa: E402
 )
 from paani_models.detector.paper_network import Yolo11n  # noqa: E402
 from paani_models.detector.train_paper_network import Yolo11nRecipe, Yolo11nTraining  # noqa: E402
-from paani_models.training.training_state import Prefetch  # noqa: E402
+from paani_models.recipes.train_and_export import start_yolo11n  # noqa: E402
+from paani_models.training.training_state import Prefetch, save_checkpoint  # noqa: E402
 
 pytestmark = [pytest.mark.train, pytest.mark.slow]
 SHORT = Yolo11nRecipe(side_px=64, batch=2)
@@ -119,6 +120,26 @@ def test_s4_mixed_precision_is_used_where_the_machine_has_it(
     run.model.stem[0].conv.register_forward_hook(lambda _module, _inputs, output: kinds.add(output.dtype))
     run._train_epoch()
     assert kinds == {torch.bfloat16 if has_bfloat16 else torch.float32}
+
+
+def test_s4_a_training_asks_for_algorithms_that_repeat_their_results(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run, asked = training(tmp_path, SHORT, monkeypatch), set()
+    run.model.stem[0].register_forward_hook(lambda *_: asked.add(torch.are_deterministic_algorithms_enabled()))
+    run.run(until=1)
+    assert asked == {True}
+    assert not torch.are_deterministic_algorithms_enabled()
+
+
+def test_s2_a_training_begins_with_the_weights_of_start_or_those_of_its_seed(tmp_path: Path) -> None:
+    known = Yolo11n()
+    save_checkpoint(tmp_path / "known.pt", {"average": known.state_dict()})
+    started = start_yolo11n(1, tmp_path / "known.pt").state_dict()
+    assert all(torch.equal(weight, started[name]) for name, weight in known.state_dict().items())
+    first, again, other = (start_yolo11n(seed, None).stem[0].conv.weight for seed in (1, 1, 2))
+    assert torch.equal(first, again)
+    assert not torch.equal(first, other)
 
 
 def test_s4_the_seed_draws_the_order_of_an_epoch(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -20,7 +20,10 @@ def finished(folder: Path, scores: list[float]) -> TrainingState:
     return progress
 
 
-@pytest.mark.parametrize(("scores", "best"), [([0.2, 0.9, 0.5, 0.8], 2), ([0.1, 0.2, 0.3], 3), ([0.3, 0.2, 0.1], 1)])
+@pytest.mark.parametrize(
+    ("scores", "best"),
+    [([0.2, 0.9, 0.5, 0.8], 2), ([0.1, 0.2, 0.3], 3), ([0.3, 0.2, 0.1], 1), ([0.3, 0.3], 1), ([0.0, -1.0], 1)],
+)
 def test_best_is_the_epoch_with_the_highest_validation_score_s9(tmp_path: Path, scores: list[float], best: int) -> None:
     finished(tmp_path, scores)
     kept, last = (load_checkpoint(tmp_path / f"{name}.pt") for name in ("best", "last"))

@@ -9,6 +9,7 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="needs the extra paani[train]")
 
+from paani_models.recipes.train_and_export import start_segmenter  # noqa: E402
 from paani_models.segmenter import train  # noqa: E402
 from paani_models.segmenter.paper_network import PaperSegmenter  # noqa: E402
 from paani_models.segmenter.train import CACHE_WH, CachedPicture, SegmenterTraining  # noqa: E402
@@ -45,6 +46,14 @@ def test_w8_every_seed_learns_and_gives_its_own_network(tmp_path: Path, monkeypa
     assert losses("again", 2) == found[2]
     orders = [train.draw_epoch(pictures, replace(RECIPE, seed=seed), 0) for seed in (1, 2, 3)]
     assert len({tuple(order) for order in orders}) == 3
+
+
+@pytest.mark.slow
+def test_w8_a_segmenter_begins_with_the_weights_of_its_seed(tmp_path: Path) -> None:
+    first, again, other = (start_segmenter("paper", tmp_path, seed).state_dict() for seed in (1, 1, 2))
+    drawn = {name for name, weight in first.items() if not torch.equal(weight, other[name])}
+    assert any(name.endswith("weight") for name in drawn)
+    assert all(torch.equal(weight, again[name]) for name, weight in first.items())
 
 
 def test_z4_the_spread_of_six_is_stated() -> None:
