@@ -13,6 +13,7 @@ from pathlib import Path
 from paani.config import PROFILES, Config, decode_config, load_config
 from paani.errors import UserError
 from paani.extras import missing_module
+from paani.option_paths import input_file
 from paani.process import run_service, services
 from paani.version import version_text
 
@@ -87,7 +88,9 @@ def usage(commands: list[str], names: list[str]) -> str:
 def add_config_arguments(parser: argparse.ArgumentParser) -> None:
     """The options that `config_from` reads."""
     parser.add_argument("--profile", choices=tuple(PROFILES), help="which set of constants (default: paani)")
-    parser.add_argument("--config", type=Path, metavar="FILE", help="settings in TOML, or in JSON (FILE.json)")
+    parser.add_argument(
+        "--config", type=input_file("--config"), metavar="FILE", help="settings in TOML, or in JSON (FILE.json)"
+    )
     parser.add_argument(
         "--set",
         action="append",

@@ -17,6 +17,7 @@ import pytest
 from examples.draw_pictures import VIEWS
 from tests.places import ROOT
 
+PRODUCT = {"shared", "services", "sim_host", "models"}
 NAMELESS = {"utils", "helpers", "common", "misc", "base", "manager", "types"}
 MAX_LINES, MAX_SERVICE_LINES = 400, 150
 
@@ -208,3 +209,9 @@ def test_the_contract_takes_no_numpy() -> None:
     """Every process imports the bus; 12 MiB in each of them are for those alone that compute with arrays."""
     code = "import sys, paani.bus, paani.decider; raise SystemExit('numpy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False, timeout=60).returncode == 0
+
+
+def test_a_path_on_the_command_line_is_judged_before_any_work() -> None:
+    """`paani.option_paths` has a kind of path for each use; a bare one fails late, and in words of Python."""
+    products = [path for path in SOURCES if path.suffix == ".py" and path.relative_to(ROOT).parts[0] in PRODUCT]
+    assert [str(p) for p in products if re.search(r"\btype=(pathlib\.)?Path\b", p.read_text(encoding="utf-8"))] == []

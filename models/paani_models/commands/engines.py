@@ -12,7 +12,7 @@ from pathlib import Path
 from paani.clock import stopwatch_ms
 from paani.errors import UserError
 from paani.option_numbers import whole_number
-from paani.option_paths import output_file
+from paani.option_paths import input_file, output_file, output_folder
 from paani.whole_file import write_json
 from paani_models.catalogue import read_contract, verified_path
 from paani_models.datasets.selection import PictureSelection
@@ -26,10 +26,14 @@ ROLES = ("detector", "segmenter")
 
 def add_convert_arguments(parser: argparse.ArgumentParser) -> None:
     """Of `paani models convert`."""
-    parser.add_argument("models", type=Path, nargs="*", metavar="MODEL.onnx", help="the shipped pair if not given")
+    parser.add_argument(
+        "models", type=input_file(), nargs="*", metavar="MODEL.onnx", help="the shipped pair if not given"
+    )
     parser.add_argument("--role", choices=ROLES, help="inferred from the output if not given")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="beside the model if not given")
-    parser.add_argument("--pnnx", type=Path, metavar="FILE", help="the converter; found on the PATH if not given")
+    parser.add_argument("--out", type=output_folder("--out"), metavar="DIR", help="beside the model if not given")
+    parser.add_argument(
+        "--pnnx", type=input_file("--pnnx"), metavar="FILE", help="the converter; found on the PATH if not given"
+    )
 
 
 def add_bench_arguments(parser: argparse.ArgumentParser) -> None:

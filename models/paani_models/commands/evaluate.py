@@ -13,7 +13,7 @@ import msgspec
 
 from paani.cluster import Workers, add_cluster_argument, open_workers
 from paani.errors import UserError
-from paani.option_paths import input_file, input_folder, output_file
+from paani.option_paths import input_file, input_folder, output_file, output_folder
 from paani.whole_file import write_json
 from paani_models.benchmarks.score_networks import score_lars, score_mods
 from paani_models.catalogue import Figure, load_catalogue, save_catalogue, verified_path
@@ -53,7 +53,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--mods", type=input_folder("--mods"), metavar="ROOT", help="score both nets by MODS's protocol instead"
     )
     parser.add_argument(
-        "--predictions", type=Path, help="with --lars or --mods: write masks and boxes in their formats"
+        "--predictions",
+        type=output_folder("--predictions"),
+        help="with --lars or --mods: write masks and boxes in their formats",
     )
     parser.add_argument(
         "--json", type=output_file("--json"), help="write figures with intervals, per source and sequence, to this file"

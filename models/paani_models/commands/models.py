@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 from paani.errors import UserError
+from paani.option_paths import input_file, input_folder, output_folder
 from paani_models.catalogue import OTHER_SETS, WEIGHTS, load_catalogue, verified_path
 from paani_models.commands import engines as engine_command
 from paani_models.commands import evaluate as evaluate_command
@@ -86,13 +87,13 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(dest="command", required=True)
 
     check = commands.add_parser("check", help="compare the shipped files with their manifest, or judge a file of yours")
-    check.add_argument("model", type=Path, nargs="?", metavar="MODEL.onnx", help="what it lacks to be run here")
+    check.add_argument("model", type=input_file(), nargs="?", metavar="MODEL.onnx", help="what it lacks to be run here")
     check.add_argument("--role", choices=PAIR, help="inferred from the output if not given")
     check.add_argument("--score", action="store_true", help="also its figures on the held-out pictures of --data")
-    check.add_argument("--weights", type=Path, default=WEIGHTS)
+    check.add_argument("--weights", type=input_folder("--weights"), default=WEIGHTS)
 
     model_card = commands.add_parser("card", help="print the model card of a weights folder, as Markdown")
-    model_card.add_argument("--weights", type=Path, default=WEIGHTS)
+    model_card.add_argument("--weights", type=input_folder("--weights"), default=WEIGHTS)
 
     held_out = commands.add_parser("held-out", help="list the held-out pictures, for `paani faults --pictures`")
     held_out.add_argument("--without-water", action="store_true", help="only those that show no water; else all others")
@@ -102,16 +103,20 @@ def _parser() -> argparse.ArgumentParser:
     prepare_command.add_pack_arguments(pack)
     train = commands.add_parser("train", help="train a net; goes on where it was stopped")
     train.add_argument("net", choices=TRAINABLE)
-    train.add_argument("--folder", type=Path, required=True, help="checkpoints and records go here")
+    train.add_argument(
+        "--folder", type=output_folder("--folder"), required=True, help="checkpoints and records go here"
+    )
     train.add_argument(
         "--start",
-        type=Path,
+        type=input_file("--start"),
         help="checkpoint, or exported ONNX file, to begin from; for gate: an exported one",
     )
-    train.add_argument("--teacher", type=Path, help="segmenter checkpoint that the paper-segmenter learns from")
+    train.add_argument(
+        "--teacher", type=input_file("--teacher"), help="segmenter checkpoint that the paper-segmenter learns from"
+    )
     train.add_argument(
         "--labels-from",
-        type=Path,
+        type=input_file("--labels-from"),
         help="segmenter checkpoint that labels unsegmented pictures; for gate: ONNX file whose errors it learns",
     )
     train.add_argument("--stage", action="append", default=[], metavar="EPOCHSxHEIGHTxWIDTH", help="repeatable")
@@ -126,7 +131,10 @@ def _parser() -> argparse.ArgumentParser:
         " the first stages stay as they are above 0, and where they are YOLOX-nano's",
     )
     train.add_argument(
-        "--mean-with", type=Path, metavar="FILE", help="detector: start from the mean of --start's weights and these"
+        "--mean-with",
+        type=input_file("--mean-with"),
+        metavar="FILE",
+        help="detector: start from the mean of --start's weights and these",
     )
     train.add_argument("--draws", type=float, default=1.0, metavar="SHARE", help="detector: of an epoch's pictures")
     train.add_argument("--size", metavar="HEIGHTxWIDTH", help="detector: of its input; 320x416 if not given")
@@ -143,13 +151,16 @@ def _parser() -> argparse.ArgumentParser:
     export = commands.add_parser("export", help="checkpoint to ONNX, compared on real pictures")
     export.add_argument("net", choices=TRAINABLE)
     exported = export.add_mutually_exclusive_group(required=True)
-    exported.add_argument("--checkpoint", type=Path)
+    exported.add_argument("--checkpoint", type=input_file("--checkpoint"))
     exported.add_argument("--untrained", action="store_true", help="random weights, to measure the speed of its shape")
     export.add_argument(
         "--looks-at", metavar="HEIGHTxWIDTH", help="segmenters: the picture inside, of a training that ended smaller"
     )
     export.add_argument(
-        "--mean-with", type=Path, metavar="FILE", help="detector, gate: the mean of the checkpoint's weights and these"
+        "--mean-with",
+        type=input_file("--mean-with"),
+        metavar="FILE",
+        help="detector, gate: the mean of the checkpoint's weights and these",
     )
     export.add_argument("--share", type=float, help="of --mean-with's weights in it; 0.5 if not given")
     evaluate = commands.add_parser("evaluate", help="figures of the exported nets on held-out sequences")
@@ -164,28 +175,36 @@ def _parser() -> argparse.ArgumentParser:
         "small-obstacles", help="how many of the small obstacles near the boat are seen"
     )
     small_obstacles_command.add_arguments(small_obstacles)
-    for command in (export, evaluate, report, temperature, small_obstacles):
-        command.add_argument("--weights", type=Path, default=WEIGHTS)
+    export.add_argument("--weights", type=output_folder("--weights"), default=WEIGHTS)
+    for command in (evaluate, report, temperature, small_obstacles):
+        command.add_argument("--weights", type=input_folder("--weights"), default=WEIGHTS)
     variant = commands.add_parser("variant", help="the same nets, taking pictures as bytes: a little faster")
-    variant.add_argument("--out", type=Path, required=True, help="folder for nets and manifest")
-    variant.add_argument("--weights", type=Path, default=WEIGHTS)
+    variant.add_argument("--out", type=output_folder("--out"), required=True, help="folder for nets and manifest")
+    variant.add_argument("--weights", type=input_folder("--weights"), default=WEIGHTS)
     convert = commands.add_parser("convert", help="ONNX to ncnn, compared on real pictures; needs pnnx")
     engine_command.add_convert_arguments(convert)
     bench = commands.add_parser("bench", help="which engine runs the nets faster on this machine")
     engine_command.add_bench_arguments(bench)
-    bench.add_argument("--weights", type=Path, default=WEIGHTS)
+    bench.add_argument("--weights", type=input_folder("--weights"), default=WEIGHTS)
     quantise = commands.add_parser("quantise", help="FP32 to INT8, and whether it may take FP32's place")
     quantise.add_argument("net", choices=PAIR)
     quantise.add_argument("--recipe", choices=("paper", "equalised"), default="equalised")
-    quantise.add_argument("--model", type=Path, metavar="FILE", help="FP32 ONNX file; the shipped one if not given")
-    quantise.add_argument("--out", type=Path, default=Path("runs/int8"), help="default: runs/int8")
-    quantise.add_argument("--calibrate", type=Path, metavar="FILE", help="calibrate on the training pictures it lists")
+    quantise.add_argument(
+        "--model", type=input_file("--model"), metavar="FILE", help="FP32 ONNX file; the shipped one if not given"
+    )
+    quantise.add_argument("--out", type=output_folder("--out"), default=Path("runs/int8"), help="default: runs/int8")
+    quantise.add_argument(
+        "--calibrate",
+        type=input_file("--calibrate"),
+        metavar="FILE",
+        help="calibrate on the training pictures it lists",
+    )
     quantise.add_argument("--for-size", action="store_true", help="accept a slower net for its smaller file")
     measuring = (evaluate, report, temperature, small_obstacles, quantise, convert, bench)
     for command in (check, held_out, check_data, pack, train, export, *measuring):
-        command.add_argument("--data", type=Path, default=data_folder())
+        command.add_argument("--data", type=input_folder("--data"), default=data_folder())
         command.add_argument("--sources", default="", help="comma-separated, or `open`; all if not given")
-        command.add_argument("--rendered", type=Path, help="folder of rendered pictures")
+        command.add_argument("--rendered", type=input_folder("--rendered"), help="folder of rendered pictures")
     return parser
 
 

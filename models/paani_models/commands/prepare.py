@@ -8,6 +8,7 @@ from pathlib import Path
 
 from paani.errors import UserError
 from paani.option_numbers import quantity
+from paani.option_paths import input_file, input_folder, output_file, output_folder
 from paani_models.datasets import inventory, mastr1325, waterscenes
 from paani_models.datasets.manifest import count_boxes, format_counts_table
 from paani_models.datasets.pack import WEIGHTS_FOLDER, pack_bundle
@@ -19,9 +20,11 @@ SETS = ("own", "waterscenes", "mastr1325")
 def add_prepare_arguments(parser: argparse.ArgumentParser) -> None:
     """Beside --data, --sources and --rendered."""
     parser.add_argument("set", nargs="?", choices=SETS, default="own", help="own: the data folder (default)")
-    parser.add_argument("--raw", type=Path, help="public set: the folder in its official layout")
-    parser.add_argument("--out", type=Path, help="public set: the new folder")
-    parser.add_argument("--manifest", type=Path, help="own: write every picture, checksum and split to this file")
+    parser.add_argument("--raw", type=input_folder("--raw"), help="public set: the folder in its official layout")
+    parser.add_argument("--out", type=output_folder("--out"), help="public set: the new folder")
+    parser.add_argument(
+        "--manifest", type=output_file("--manifest"), help="own: write every picture, checksum and split to this file"
+    )
     parser.add_argument("--by", choices=("sequence", "image"), default="sequence", help="mastr1325: image as the paper")
     parser.add_argument("--strict", action="store_true", help="waterscenes: refuse official splits that share views")
     parser.add_argument("--missing-is-empty", action="store_true", help="waterscenes: no label file, no object")
@@ -29,10 +32,12 @@ def add_prepare_arguments(parser: argparse.ArgumentParser) -> None:
 
 def add_pack_arguments(parser: argparse.ArgumentParser) -> None:
     """Beside --data, --sources and --rendered."""
-    parser.add_argument("--out", type=Path, required=True, help="the tar file")
+    parser.add_argument("--out", type=output_file("--out"), required=True, help="the tar file")
     size_mb = quantity("MB", high=1e6)
     parser.add_argument("--max-mb", type=size_mb, default=60.0, help="its largest size, in millions of bytes")
-    parser.add_argument("--start", type=Path, action="append", default=[], help="checkpoint to add, repeatable")
+    parser.add_argument(
+        "--start", type=input_file("--start"), action="append", default=[], help="checkpoint to add, repeatable"
+    )
 
 
 def prepare_own(pictures: PictureSelection, manifest: Path | None) -> int:

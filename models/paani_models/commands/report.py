@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 from paani.errors import UserError
-from paani.option_paths import input_file, output_folder
+from paani.option_paths import input_file, input_folder, output_folder
 from paani.whole_file import write_whole
 from paani_models.catalogue import load_catalogue, verified_path
 from paani_models.commands.evaluate import score_pair, write_evaluation
@@ -32,10 +32,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", type=output_folder("--out"), required=True, help="folder outside any repository; made if missing"
     )
-    parser.add_argument("--runs", type=Path, action="append", default=[], help="folder of a training, repeatable")
+    parser.add_argument(
+        "--runs", type=input_folder("--runs"), action="append", default=[], help="folder of a training, repeatable"
+    )
     parser.add_argument("--faults", type=input_file("--faults"), help="file written by `paani faults --json`")
     parser.add_argument(
-        "--evidence", type=Path, action="append", default=[], help="findings of another class, repeatable"
+        "--evidence",
+        type=input_file("--evidence"),
+        action="append",
+        default=[],
+        help="findings of another class, repeatable",
     )
 
 

@@ -7,7 +7,6 @@ import asyncio
 import os
 import sys
 from collections.abc import Callable
-from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import msgspec
@@ -15,7 +14,7 @@ import msgspec
 from paani.cli import add_config_arguments, config_from
 from paani.errors import UserError
 from paani.option_numbers import seconds, whole_number
-from paani.option_paths import output_file
+from paani.option_paths import input_path, output_file
 from paani.statistics.figure_table import FigureTable, installed_commands, installed_tables, table_text
 from paani.statistics.measured import Machine, Report, measure_tables
 from paani.whole_file import write_whole
@@ -70,7 +69,7 @@ def _main(argv: list[str]) -> int:
     )
     judgement.add_argument(
         "--drive",
-        type=Path,
+        type=input_path("--drive"),
         action="append",
         default=[],
         metavar="LOG",
@@ -81,7 +80,12 @@ def _main(argv: list[str]) -> int:
     planning = benches.add_parser("planner", help="the navigator's map and plan among 12 moving obstacles")
     planning.add_argument("--steps", type=whole_number(), default=300, metavar="N", help="to plan; default: 300")
     planning.add_argument(
-        "--drive", type=Path, action="append", default=[], metavar="LOG", help="plan these recordings again as well"
+        "--drive",
+        type=input_path("--drive"),
+        action="append",
+        default=[],
+        metavar="LOG",
+        help="plan these recordings again as well",
     )
     planning.add_argument("--json", type=output_file("--json"), metavar="FILE", help="write the figures there too")
     add_config_arguments(planning)

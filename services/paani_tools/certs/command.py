@@ -12,6 +12,7 @@ from paani.cli import add_config_arguments, config_from
 from paani.clock import WallClock
 from paani.extras import require_modules
 from paani.option_numbers import whole_number
+from paani.option_paths import input_folder, output_folder
 
 DAYS = 365
 MAX_DAYS = 3650
@@ -88,7 +89,8 @@ def _parser() -> argparse.ArgumentParser:
         "show", help="names, expiry and SHA-256; exit code 1 where one is missing or not valid now"
     )
     for action in (make, rotate, complete, revoke, show):
-        action.add_argument("--folder", type=Path, required=True, metavar="FOLDER", help="where the certificates lie")
+        kind = output_folder if action is make else input_folder
+        action.add_argument("--folder", type=kind("--folder"), required=True, metavar="FOLDER", help="where they lie")
     for action in (make, rotate, complete):
         action.add_argument(
             "--days",

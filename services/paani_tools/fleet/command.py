@@ -6,7 +6,6 @@ import argparse
 import asyncio
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 
 import msgspec
 
@@ -14,6 +13,7 @@ from paani.clock import MonotonicClock, WallClock
 from paani.config import BusConfig
 from paani.errors import UserError
 from paani.option_numbers import whole_number
+from paani.option_paths import input_file
 from paani_tools.fleet.fleet_file import read_fleet
 from paani_tools.fleet.page import HOST, serve_page
 from paani_tools.fleet.shore import Vessel, stop_vessels, watch_fleet
@@ -94,7 +94,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="paani fleet", description="What many vessels do, and STOP for one or all of them, from the shore."
     )
-    parser.add_argument("fleet", type=Path, metavar="FILE", help="the vessels, in TOML")
+    parser.add_argument("fleet", type=input_file(), metavar="FILE", help="the vessels, in TOML")
     acts = parser.add_mutually_exclusive_group()
     acts.add_argument("--list", action="store_true", help="one line for each vessel, as now, and no page")
     acts.add_argument("--json", action="store_true", help="the same, for a program")

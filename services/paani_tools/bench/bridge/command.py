@@ -17,6 +17,7 @@ from paani.cli import add_config_arguments, config_from
 from paani.config import Config, with_settings
 from paani.errors import UserError
 from paani.option_numbers import whole_number
+from paani.option_paths import input_file
 from paani.statistics.figure_table import FigureTable, table_text
 from paani.statistics.measured import Machine, Report
 from paani.statistics.order_statistics import median, nearest_rank
@@ -35,7 +36,9 @@ def main(argv: list[str]) -> int:
     parser = argparse.ArgumentParser(
         prog="paani bench bridge", description="The bridge against the firmware on an emulated microcontroller."
     )
-    parser.add_argument("--image", type=Path, default=IMAGE, metavar="ELF", help=f"the firmware; default: {IMAGE}")
+    parser.add_argument(
+        "--image", type=input_file("--image"), default=IMAGE, metavar="ELF", help=f"the firmware; default: {IMAGE}"
+    )
     parser.add_argument(
         "--count", type=whole_number(2, 100_000), default=100, metavar="N", help="samples of each figure; default: 100"
     )

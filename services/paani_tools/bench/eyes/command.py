@@ -60,7 +60,7 @@ def main(argv: list[str]) -> int:
     parser.add_argument(
         "--with",
         dest="others",
-        type=Path,
+        type=input_folder("--with"),
         action="append",
         default=[],
         metavar="FOLDER",

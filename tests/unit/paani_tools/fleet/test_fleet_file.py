@@ -69,7 +69,7 @@ def test_a_mistake_is_told_by_file_and_vessel(fleet: Path, text: str, message: s
 
 
 def test_a_file_or_a_vessel_that_is_not_there(fleet: Path) -> None:
-    with pytest.raises(UserError, match=r"nowhere\.toml: No such file"):
+    with pytest.raises(UserError, match=r"nowhere\.toml: no such file"):
         main([str(fleet.with_name("nowhere.toml"))])
     with pytest.raises(UserError, match=r"--stop beaver: no such vessel in .*\(have: otter\)"):
         main([str(fleet), "--stop", "otter", "beaver"])
