@@ -31,9 +31,7 @@ def add_convert_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--role", choices=ROLES, help="inferred from the output if not given")
     parser.add_argument("--out", type=output_folder("--out"), metavar="DIR", help="beside the model if not given")
-    parser.add_argument(
-        "--pnnx", type=input_file("--pnnx"), metavar="FILE", help="the converter; found on the PATH if not given"
-    )
+    parser.add_argument("--pnnx", metavar="FILE", help="the converter; found on the PATH if not given")
 
 
 def add_bench_arguments(parser: argparse.ArgumentParser) -> None:

@@ -29,13 +29,13 @@ PNNX_NOT_FOUND = (
 )
 
 
-def convert_to_ncnn(source: Path, role: str, folder: Path, pnnx: Path | None, inputs: Inputs) -> Conversion:
+def convert_to_ncnn(source: Path, role: str, folder: Path, pnnx: str | None, inputs: Inputs) -> Conversion:
     """Write the ncnn files of a float32 model into `folder`, the model and its manifest entry too if it is elsewhere.
 
     inputs: the pictures on which both must agree to MAX_DIFFERENCE; else nothing is written. Raises UserError naming
     what is missing, what ncnn cannot run, or the difference.
     """
-    program = shutil.which(str(pnnx) if pnnx else "pnnx")
+    program = shutil.which(pnnx or "pnnx")
     if program is None:
         raise UserError(f"--pnnx {pnnx}: no such program" if pnnx else PNNX_NOT_FOUND)
     contract = read_contract(source, role)

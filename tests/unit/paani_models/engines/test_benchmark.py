@@ -120,13 +120,14 @@ def test_bench_reports_why_ncnn_is_excluded(tmp_path: Path, capsys: pytest.Captu
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("without_data")
 def test_bench_runs_both_engines(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     segmenter = place(small_segmenter(tmp_path / "segmenter.onnx"), CONVOLUTION, packed())
     place(Path(shutil.copy(verified_path("detector"), tmp_path)), NO_BOXES, bytes(4 * 8 * 2730))
     catalogue = load_catalogue()
     own = msgspec.structs.replace(catalogue["segmenter"], sha256=file_sha256(segmenter))
     save_catalogue({"segmenter": own, "detector": catalogue["detector"]}, tmp_path)
-    words = ["bench", "--weights", str(tmp_path), "--threads", "1,2", "--rounds", "1", "--data", "no/such/folder"]
+    words = ["bench", "--weights", str(tmp_path), "--threads", "1,2", "--rounds", "1"]
     assert main([*words, "--json", str(tmp_path / "bench.json")]) == 0
     report = msgspec.json.decode((tmp_path / "bench.json").read_bytes(), type=EngineReport)
     assert {(row.engine, row.threads) for row in report.rows} == {

@@ -173,9 +173,10 @@ def test_other_releases_of_onnxruntime_run(release: str) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("without_data")
 def test_convert_writes_what_the_engine_runs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     source, out = small_segmenter(tmp_path / "own.onnx"), tmp_path / "out"
-    words = ["convert", str(source), "--pnnx", str(program(tmp_path)), "--out", str(out), "--data", "no/such/folder"]
+    words = ["convert", str(source), "--pnnx", str(program(tmp_path)), "--out", str(out)]
     assert main(words) == 0
     printed = capsys.readouterr().out
     assert "differ by at most" in printed
@@ -198,12 +199,13 @@ def test_convert_writes_what_the_engine_runs(tmp_path: Path, capsys: pytest.Capt
     ids=["failure", "layer", "difference", "not finite", "shape"],
 )
 @pytest.mark.slow
+@pytest.mark.usefixtures("without_data")
 def test_a_bad_conversion_leaves_nothing(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], param: str, weights: bytes, code: int, message: str
 ) -> None:
     source, out = small_segmenter(tmp_path / "own.onnx"), tmp_path / "out"
     pnnx = program(tmp_path, param, weights, code)
-    assert main(["convert", str(source), "--pnnx", str(pnnx), "--out", str(out), "--data", "no/such/folder"]) == 2
+    assert main(["convert", str(source), "--pnnx", str(pnnx), "--out", str(out)]) == 2
     error = capsys.readouterr().err
     assert message in error
     assert error.startswith("paani models: ")
@@ -213,14 +215,15 @@ def test_a_bad_conversion_leaves_nothing(
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("without_data")
 def test_a_missing_pnnx_is_reported_with_its_remedy(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     source = small_segmenter(tmp_path / "own.onnx")
     monkeypatch.setenv("PATH", str(tmp_path))
-    assert main(["convert", str(source), "--data", "no/such/folder"]) == 2
+    assert main(["convert", str(source)]) == 2
     assert "pip install --no-deps pnnx" in capsys.readouterr().err
-    assert main(["convert", str(source), "--pnnx", "no/pnnx", "--data", "no/such/folder"]) == 2
+    assert main(["convert", str(source), "--pnnx", "no/pnnx"]) == 2
     assert capsys.readouterr().err == "paani models: --pnnx no/pnnx: no such program\n"
 
 

@@ -329,10 +329,14 @@ def test_a_picture_inside_is_of_a_segmenter_and_of_whole_cells(
 ) -> None:
     (tmp_path / "surf_people").mkdir()
     (tmp_path / "surf_people" / "manifest.json").write_text('{"items":[]}')
-    where = ["--data", str(tmp_path), "--sources", "surf_people", "--checkpoint", "last.pt", "--weights", str(tmp_path)]
+    checkpoint, earlier = tmp_path / "last.pt", tmp_path / "earlier.onnx"
+    for path in (checkpoint, earlier):
+        path.touch()
+    pictures = ["--data", str(tmp_path), "--sources", "surf_people"]
+    where = [*pictures, "--checkpoint", str(checkpoint), "--weights", str(tmp_path)]
     assert main(["export", *words, *where]) == 2
     assert "--looks-at: detector" in (message := capsys.readouterr().err) or "multiples of 32" in message
-    assert main(["export", "segmenter", "--mean-with", "earlier.onnx", *where]) == 2
+    assert main(["export", "segmenter", "--mean-with", str(earlier), *where]) == 2
     assert capsys.readouterr().err == "paani models: --mean-with: segmenter is neither our detector nor our gate\n"
     assert main(["export", "detector", "--share", "0.25", *where]) == 2
     assert capsys.readouterr().err == "paani models: --share 0.25: of what? --mean-with says whose weights\n"
@@ -345,7 +349,8 @@ def test_the_papers_networks_take_no_shipped_place(
     (tmp_path / "surf_people").mkdir()
     (tmp_path / "surf_people" / "manifest.json").write_text('{"items":[]}')
     where = ["--data", str(tmp_path), "--sources", "surf_people"]
-    assert main(["export", net, "--checkpoint", "last.pt", *where]) == 2
+    (tmp_path / "last.pt").touch()
+    assert main(["export", net, "--checkpoint", str(tmp_path / "last.pt"), *where]) == 2
     assert f"--weights: {net} is not what ships there" in capsys.readouterr().err
     for folder in (WEIGHTS, PAPER_WEIGHTS):
         assert main(["export", net, "--untrained", *where, "--weights", str(folder)]) == 2
@@ -387,6 +392,9 @@ def test_export_notices_other_weights(tmp_path: Path) -> None:
     assert largest_export_difference(PaperSegmenter().eval(), tmp_path / "net.onnx", inputs) > 1e-3
 
 
-def test_a_missing_data_folder_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["prepare", "--data", str(tmp_path / "absent")]) == 2
+def test_a_missing_data_folder_is_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PAANI_DATA", str(tmp_path / "absent"))
+    assert main(["prepare"]) == 2
     assert capsys.readouterr().err == f"paani models: {tmp_path / 'absent'}: no such folder; set PAANI_DATA or --data\n"
