@@ -117,7 +117,7 @@ async def scripts_page(browser: Any) -> Any:
 
 
 @pytest.fixture(scope="session")
-async def launched_browser() -> AsyncIterator[Any]:
+async def browser() -> AsyncIterator[Any]:
     pytest.importorskip("playwright.async_api", reason="playwright is not installed")
     from paani_tools.bench.deck.browser import find_chromium, launched  # noqa: PLC0415  it needs playwright
 
@@ -126,11 +126,3 @@ async def launched_browser() -> AsyncIterator[Any]:
         pytest.skip("no Chromium on this machine")
     async with launched(path) as browser:
         yield browser
-
-
-@pytest.fixture
-async def browser(launched_browser: Any) -> AsyncIterator[Any]:
-    """The browser of all tests of this worker, whose pages close with the test that opened them."""
-    yield launched_browser
-    for context in launched_browser.contexts:
-        await context.close()
