@@ -116,7 +116,7 @@ async def scripts_page(browser: Any) -> Any:
     return page
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture
 async def browser() -> AsyncIterator[Any]:
     pytest.importorskip("playwright.async_api", reason="playwright is not installed")
     from paani_tools.bench.deck.browser import find_chromium, launched  # noqa: PLC0415  it needs playwright
