@@ -104,9 +104,10 @@ def require_loadable(options: argparse.Namespace) -> Config:
 def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder as the reader has it: the examples, drives that were recorded, and files of the reader's own."""
     (tmp_path / "examples").symlink_to(ROOT / "examples")
-    for folder in ("runs/drive", "runs/first", "runs/moored", "mine", "FOLDER"):
+    for folder in ("runs/drive", "runs/first", "runs/moored", "runs/segmenter", "mine", "FOLDER"):
         (tmp_path / folder).mkdir(parents=True)
-    for file in ("mine.toml", "mine/segmenter.onnx", "mount.toml", "clip.mp4", "runs/one.mcap", "PATH..."):
+    touched = ("mine.toml", "mine-settings.toml", "mount.toml", "thrusters.toml")
+    for file in (*touched, "mine/segmenter.onnx", "clip.mp4", "runs/one.mcap", "runs/segmenter/best.pt", "PATH..."):
         (tmp_path / file).touch()
     for mission in ("mission.toml", "calibration.toml"):
         (tmp_path / mission).write_bytes((ROOT / "examples" / "mission.toml").read_bytes())
@@ -144,6 +145,7 @@ def test_every_row_runs_as_written(checkout: Path, capsys: pytest.CaptureFixture
 
 @pytest.mark.parametrize("command", MANUAL)
 def test_a_command_of_the_manual_has_its_arguments_right(command: str, checkout: Path) -> None:
+    (checkout / "runs" / "rendered").mkdir()  # which another command of the manual makes
     if not is_one_of(command, OF_ANOTHER_PACKAGE):
         parsed(command)
 

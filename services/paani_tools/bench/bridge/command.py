@@ -17,7 +17,6 @@ from paani.cli import add_config_arguments, config_from
 from paani.config import Config, with_settings
 from paani.errors import UserError
 from paani.option_numbers import whole_number
-from paani.option_paths import input_file
 from paani.statistics.figure_table import FigureTable, table_text
 from paani.statistics.measured import Machine, Report
 from paani.statistics.order_statistics import median, nearest_rank
@@ -36,19 +35,18 @@ def main(argv: list[str]) -> int:
     parser = argparse.ArgumentParser(
         prog="paani bench bridge", description="The bridge against the firmware on an emulated microcontroller."
     )
-    parser.add_argument(
-        "--image", type=input_file("--image"), default=IMAGE, metavar="ELF", help=f"the firmware; default: {IMAGE}"
-    )
+    parser.add_argument("--image", default=IMAGE, metavar="ELF", help=f"the firmware; default: {IMAGE}")
     parser.add_argument(
         "--count", type=whole_number(2, 100_000), default=100, metavar="N", help="samples of each figure; default: 100"
     )
     parser.add_argument("--json", action="store_true", help="print JSON; progress goes to standard error")
     add_config_arguments(parser)
     options = parser.parse_args(argv)
-    require_emulator(options.image)
+    image = Path(options.image)
+    require_emulator(image)
     config = _private(config_from(options))
     cores, load_before = os.cpu_count() or 1, os.getloadavg()[0]
-    part = asyncio.run(_measure(options.image, config, options.count))
+    part = asyncio.run(_measure(image, config, options.count))
     machine = Machine(cores=cores, load_before=round(load_before, 2), load_after=round(os.getloadavg()[0], 2))
     if options.json:
         sys.stdout.write(msgspec.json.encode(Report(machine=machine, parts=(part,))).decode() + "\n")
