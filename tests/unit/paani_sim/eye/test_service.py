@@ -105,7 +105,7 @@ async def test_pose_in_picture_out(open_as: Callable[[str], Awaitable[Bus]], con
         seen: list[Picture] = []
         sent: dict[int, float] = {}
         async with asyncio.timeout(40.0):
-            while len(seen) < 4:
+            while len(seen) < 8:
                 x_m = 20.0 + 2.0 * len(seen)
                 sent[poses.put(truth(clock.now_us(), x_m=x_m)).source_us] = x_m
                 with contextlib.suppress(TimeoutError):
@@ -114,10 +114,11 @@ async def test_pose_in_picture_out(open_as: Callable[[str], Awaitable[Bus]], con
             drawing = next(each for each in threading.enumerate() if each.name.startswith("gl"))
             assert niceness(drawing.native_id) == niceness(threading.get_native_id()) + 5, "drawing alone yields"
     headers = [p.header for p in seen]
-    assert [h.frame_seq for h in headers] == [0, 1, 2, 3]
+    assert [h.frame_seq for h in headers] == [*range(8)]
     assert all(h.source_us in sent for h in headers)
     assert len({h.frame_epoch for h in headers}) == 1
-    assert headers[-1].sent_us - headers[0].sent_us > 2.5e6 / config.eye.rate_hz
+    # Of seven periods, as the first picture may be late by less than one.
+    assert headers[-1].sent_us - headers[0].sent_us > 6e6 / config.eye.rate_hz
     first, last = (
         np.asarray(cv2.imdecode(np.frombuffer(seen[place].data, np.uint8), cv2.IMREAD_COLOR), np.float32)
         for place in (0, -1)
