@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from tests.claims_check.table import TABLE, Mutant
-from tests.places import DATA
+from tests.places import DATA, PRODUCT
 
-PACKAGES = (".", "shared", "services", "sim_host", "models")  # folders that Python looks into, before all others
+PACKAGES = (".", *PRODUCT)  # folders that Python looks into, before all others
 LEFT_OUT = (".git", ".venv", "runs", "dist", "build", "__pycache__", ".*_cache", ".hypothesis", "*.egg-info")
 FAILED = 1  # exit code of pytest when tests ran and some failed
 MESSAGE_CHARS = 1000  # of why a test failed

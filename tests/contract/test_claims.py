@@ -13,7 +13,7 @@ from tests.claims_check.__main__ import choose_rows, main
 from tests.claims_check.left_out import left_out_text
 from tests.claims_check.table import IDS, TABLE, Mutant, Row, find_faults, read_table
 from tests.claims_check.tree import Tree
-from tests.places import ROOT
+from tests.places import PRODUCT, ROOT
 
 CLAIMS = read_table(ROOT)
 
@@ -41,7 +41,7 @@ def test_every_proved_row_has_a_mutant() -> None:
 def test_every_cited_statement_is_in_the_file() -> None:
     """An id in a docstring or comment, such as (J7) or (I1-I5), is a row of the file."""
     cited = re.compile(r"\b([A-W])(\d{1,2})\b(?:\s?-\s?[A-W]?(\d{1,2})\b)?")
-    for folder in ("shared", "services", "sim_host", "models"):
+    for folder in PRODUCT:
         for path in (ROOT / folder).rglob("*.py"):
             for bracket in re.findall(r"\(([A-W]\d[^()]{0,60})\)", path.read_text(encoding="utf-8")):
                 for letter, first, last in cited.findall(bracket):

@@ -15,9 +15,8 @@ from pathlib import Path
 import pytest
 
 from examples.draw_pictures import VIEWS
-from tests.places import ROOT
+from tests.places import PRODUCT, ROOT
 
-PRODUCT = {"shared", "services", "sim_host", "models"}
 NAMELESS = {"utils", "helpers", "common", "misc", "base", "manager", "types"}
 MAX_LINES, MAX_SERVICE_LINES = 400, 150
 
@@ -109,7 +108,7 @@ def test_no_picture_of_the_data_ships() -> None:
 
 
 def test_every_top_level_folder_explains_itself() -> None:
-    for folder in ("shared", "services", "sim_host", "models", "mcu", "deploy", "examples", "tests"):
+    for folder in (*PRODUCT, "mcu", "deploy", "examples", "tests"):
         assert (ROOT / folder / "README.md").is_file(), folder
 
 

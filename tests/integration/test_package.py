@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from paani.version import commit
-from tests.places import ROOT
+from tests.places import PRODUCT, ROOT
 
 pytestmark = pytest.mark.integration
 
@@ -57,7 +57,7 @@ def test_a_wheel_holds_no_file_of_the_tests_and_every_one_that_runs(wheel: Path)
     names = set(zipfile.ZipFile(wheel).namelist())
     assert {"paani/commit.txt", "paani_tools/claims/claims.toml", "paani_tools/doctor/host.lock"} < names
     tracked = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=False).stdout
-    for top in ("shared", "services", "sim_host", "models"):
+    for top in PRODUCT:
         for name in tracked.splitlines():
             if name.startswith(f"{top}/paani"):
                 assert name.removeprefix(f"{top}/") in names

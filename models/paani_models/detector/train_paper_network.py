@@ -74,19 +74,19 @@ class Yolo11nTraining:
             _parameter_groups(model, recipe), recipe.peak_rate, betas=(recipe.momentum, 0.999)
         )
 
+    @deterministic_algorithms()
     def run(self, until: int | None = None) -> None:
         """Train to the end, to epoch `until`, or until the figures no longer rise; Ctrl-C loses no finished epoch."""
         recipe = asdict(self.recipe)
         self.state.resume(self.folder, recipe)
         last = self.recipe.epochs if until is None else until
-        with deterministic_algorithms():
-            while self.state.epoch < last and self._since_best() < self.recipe.patience:
-                losses = self._train_epoch()
-                figures = figures_by_class(self.state.average.model, self.held_out, SIZE_WH)
-                score = round(mean_ap50(figures), 4)
-                row = {"epoch": self.state.epoch + 1, "score": score, **losses, **figures}
-                append_record(self._records(), row)
-                self.state.finish_epoch(self.folder, recipe, score)
+        while self.state.epoch < last and self._since_best() < self.recipe.patience:
+            losses = self._train_epoch()
+            figures = figures_by_class(self.state.average.model, self.held_out, SIZE_WH)
+            score = round(mean_ap50(figures), 4)
+            row = {"epoch": self.state.epoch + 1, "score": score, **losses, **figures}
+            append_record(self._records(), row)
+            self.state.finish_epoch(self.folder, recipe, score)
 
     def _records(self) -> Path:
         return self.folder / "epochs.jsonl"

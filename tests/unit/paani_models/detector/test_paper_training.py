@@ -23,7 +23,8 @@ from paani_models.detector.paper_data import (  # noqa: E402
 from paani_models.detector.paper_network import Yolo11n  # noqa: E402
 from paani_models.detector.train_paper_network import Yolo11nRecipe, Yolo11nTraining  # noqa: E402
 from paani_models.recipes.train_and_export import start_yolo11n  # noqa: E402
-from paani_models.training.training_state import Prefetch, save_checkpoint  # noqa: E402
+from paani_models.training.training_state import save_checkpoint  # noqa: E402
+from tests.unit.paani_models.training.noted_workers import note_workers  # noqa: E402
 
 pytestmark = [pytest.mark.train, pytest.mark.slow]
 SHORT = Yolo11nRecipe(side_px=64, batch=2)
@@ -56,17 +57,7 @@ def test_s2_a_batch_is_32_squares_of_320_px(tmp_path: Path, monkeypatch: pytest.
 
 def test_s2_s3_the_first_epoch_is_by_the_papers_recipe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Four workers, AdamW, and a third of a warm-up that takes three epochs: two steps of six."""
-    asked: list[int] = []
-
-    class NotingPrefetch(Prefetch[Any]):
-        def __init__(self, workers: int) -> None:
-            asked.append(workers)
-            super().__init__(workers)
-
-        def __class_getitem__(cls, _item: object) -> Any:
-            return cls
-
-    monkeypatch.setattr(train_paper_network, "Prefetch", NotingPrefetch)
+    asked = note_workers(monkeypatch, train_paper_network)
     run = training(tmp_path, SHORT, monkeypatch)
     run.run(until=1)
     assert asked == [4]

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
 
 @pytest.fixture
-def without_data(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
+def without_data(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
     """What `PAANI_DATA` names is not there."""
-    absent = tmp_path_factory.mktemp("data") / "absent"
-    monkeypatch.setenv("PAANI_DATA", str(absent))
-    return absent
+    monkeypatch.setenv("PAANI_DATA", str(tmp_path_factory.mktemp("data") / "absent"))

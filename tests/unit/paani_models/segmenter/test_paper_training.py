@@ -18,7 +18,8 @@ from paani_models.recipes.train_and_export import TrainingOptions, segmenter_rec
 from paani_models.segmenter import train  # noqa: E402
 from paani_models.segmenter.paper_network import PaperSegmenter, segmenter_loss  # noqa: E402
 from paani_models.segmenter.train import CACHE_WH, PAPER_RECIPE, CachedPicture, SegmenterTraining  # noqa: E402
-from paani_models.training.training_state import Prefetch, Stage  # noqa: E402
+from paani_models.training.training_state import Stage  # noqa: E402
+from tests.unit.paani_models.training.noted_workers import note_workers  # noqa: E402
 
 pytestmark = [pytest.mark.train, pytest.mark.slow]
 SHORT = replace(PAPER_RECIPE, stages=(Stage(2, 64, 64),), batch=2)
@@ -51,17 +52,7 @@ def test_s6_s7_every_step_of_two_epochs_is_by_the_papers_recipe(
 ) -> None:
     """Four workers; half a cosine over all steps; decay of the weights."""
     assert segmenter_recipe("paper-segmenter", TrainingOptions(tmp_path)) == PAPER_RECIPE
-    asked: list[int] = []
-
-    class NotingPrefetch(Prefetch[Any]):
-        def __init__(self, workers: int) -> None:
-            asked.append(workers)
-            super().__init__(workers)
-
-        def __class_getitem__(cls, _item: object) -> Any:
-            return cls
-
-    monkeypatch.setattr(train, "Prefetch", NotingPrefetch)
+    asked = note_workers(monkeypatch, train)
     pictures = drawn_pictures(4)
     training = SegmenterTraining(PaperSegmenter(), SHORT, tmp_path, pictures, pictures[:1])
     rates: list[float] = []
