@@ -5,6 +5,7 @@
 PYTHON ?= python3
 VENV   ?= .venv
 EXTRAS ?= host,dev
+PARTS  ?= 4
 comma  := ,
 LOCKED := base host dev
 # Names no index, and takes one version for all Pythons: what was tested on the host is what the board runs.
@@ -27,8 +28,8 @@ DEBIAN_PYTHON = $(if $(wildcard $(BIN)/python),,$(shell $(PYTHON) -c 'import ens
 run: setup ## start the whole loop on the river world
 	$(PAANI) up $(ARGS)
 
-test: setup-test system-firmware system-deploy lint ## everything that CI runs
-	$(BIN)/python -m pytest -q -n 3 --durations=20 tests -m "not long"
+test: setup-test system-firmware system-deploy lint ## everything that CI runs; PARTS=1 runs what takes turns as well
+	$(BIN)/python -m pytest -q -n 3 --durations=20 --parts=$(PARTS) tests -m "not long"
 
 test-long: setup-test ## what takes hours: the standard suite of trials, tests marked `long`; interrupted, the same command goes on
 	@mkdir -p runs

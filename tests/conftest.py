@@ -55,6 +55,8 @@ settings.register_profile("quick", max_examples=15, deadline=None)  # for `make 
 settings.register_profile("thorough", deadline=None)  # a busy machine fails no test
 settings.load_profile("thorough")
 
+pytest_plugins = ("tests.rotation",)
+
 FIRST_PORT, PORTS_OF_A_WORKER, PORT_WORKERS = 20_000, 3_000, 4
 START_TIMEOUT_S = 40.0
 STOP_TIMEOUT_S = 10.0

@@ -83,6 +83,7 @@ def test_twelve_polls_of_the_papers_loop(tmp_path: Path, private_sets: tuple[str
     assert open_log(folder).topics[keys.EVIDENCE.name] >= len(results) - 2
 
 
+@pytest.mark.rotating(cpu_s=10)
 def test_a_loop_on_pictures_needs_no_simulator_can_be_attached_to_and_keeps_what_an_interrupt_leaves(
     tmp_path: Path, private_sets: tuple[str, ...]
 ) -> None:

@@ -16,6 +16,7 @@ from paani_tools.up.run_summary import STAGES
 pytestmark = [pytest.mark.integration, pytest.mark.timeout(150)]
 
 
+@pytest.mark.rotating(cpu_s=30)
 def test_bench_chain(private_sets: tuple[str, ...]) -> None:
     words = [word for setting in private_sets for word in ("--set", setting)]
     result = subprocess.run(

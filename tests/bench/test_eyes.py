@@ -21,6 +21,7 @@ from tests.pictures import river
 pytestmark = [pytest.mark.integration, pytest.mark.timeout(300)]
 
 
+@pytest.mark.rotating(cpu_s=20)
 def test_bench_eyes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / "pictures"
     folder.mkdir()

@@ -12,6 +12,7 @@ import pytest
 pytestmark = [pytest.mark.integration, pytest.mark.timeout(150)]
 
 
+@pytest.mark.rotating(cpu_s=20)
 def test_bench_recorder(tmp_path: Path, private_sets: tuple[str, ...]) -> None:
     file = tmp_path / "figures.json"
     words = [word for setting in private_sets for word in ("--set", setting)]

@@ -19,6 +19,7 @@ MAX_LASTING_SLOPE_MIB_H = 60.0
 pytestmark = [pytest.mark.integration, pytest.mark.timeout(DRIVEN_S + 120)]
 
 
+@pytest.mark.rotating(cpu_s=280)
 def test_five_minutes_of_a_drive(private_sets: tuple[str, ...], tmp_path: Path) -> None:
     words = [word for setting in private_sets for word in ("--set", setting)]
     result = subprocess.run(

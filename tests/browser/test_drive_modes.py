@@ -29,6 +29,7 @@ ENDED = "the advice is no longer overridden: "
 ORDERED = (DriveMode.HOLD, DriveMode.RETURN, DriveMode.IDLE, DriveMode.ROUTE)
 
 
+@pytest.mark.rotating(cpu_s=10)
 async def test_each_mode_is_ordered_on_the_page_and_the_advice_overridden_on_purpose(
     browser: Any, boat: Boat, open_as: OpenAs, spawn: Spawn, config: Config
 ) -> None:

@@ -78,6 +78,7 @@ async def until_in_sight(page: Any, orders: Orders, size: tuple[int, int]) -> No
         pytest.fail(f"{size}: {hidden}")
 
 
+@pytest.mark.rotating(cpu_s=10)
 async def test_a_gamepad_drives_by_what_is_in_view_on_every_screen(driven: tuple[Any, Orders], tmp_path: Path) -> None:
     page, orders = driven
     for width, height, least_px in SIZES:

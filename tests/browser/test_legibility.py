@@ -68,6 +68,7 @@ async def faint_in_other_palettes(page: Any, palette: str) -> list[str]:
     return found
 
 
+@pytest.mark.rotating(cpu_s=20)
 async def test_every_palette_and_size_is_legible(
     browser: Any, boat: Boat, open_as: OpenAs, spawn: Spawn, config: Config
 ) -> None:

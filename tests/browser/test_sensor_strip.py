@@ -37,6 +37,7 @@ def private_sets(private_sets: tuple[str, ...]) -> tuple[str, ...]:
     return (*private_sets, "profile=hull")
 
 
+@pytest.mark.rotating(cpu_s=10)
 @pytest.mark.parametrize("size", [(1440, 900), (360, 740)], ids=["desk", "phone"])
 async def test_each_device_is_named_with_its_status_and_what_is_wrong(
     browser: Any, open_as: OpenAs, spawn: Spawn, config: Config, size: tuple[int, int], tmp_path: Path

@@ -73,6 +73,7 @@ async def show(page: Any, tab: str) -> None:
     await page.wait_for_timeout(700)
 
 
+@pytest.mark.rotating(cpu_s=10)
 async def test_no_tab_scrolls_sideways_on_a_phone(
     browser: Any, boat: Boat, talkative: None, open_as: OpenAs, spawn: Spawn, config: Config, tmp_path: Path
 ) -> None:
@@ -97,6 +98,7 @@ async def test_no_tab_scrolls_sideways_on_a_phone(
         )
 
 
+@pytest.mark.rotating(cpu_s=10)
 async def test_what_is_written_grows_with_a_large_screen(
     browser: Any, boat: Boat, talkative: None, open_as: OpenAs, spawn: Spawn, config: Config, tmp_path: Path
 ) -> None:

@@ -41,6 +41,7 @@ async def press_strip(page: Any, part: float) -> None:
     await page.mouse.click(box["x"] + part * box["width"], box["y"] + box["height"] / 2)
 
 
+@pytest.mark.rotating(cpu_s=10)
 async def test_a_press_shows_that_moment_everywhere(
     browser: Any, boat: Boat, open_as: OpenAs, spawn: Spawn, config: Config, tmp_path: Path
 ) -> None:

@@ -86,6 +86,7 @@ def figures(summary: dict[str, Any], thruster: str) -> str:
     )
 
 
+@pytest.mark.rotating(cpu_s=90)
 async def test_the_simulated_boat_drives_by_the_pulses_alone(tmp_path: Path) -> None:
     """Through the firmware it makes at least three fifths of the direct adapter's way, and touches nothing."""
     direct = await drive(tmp_path / "direct", "--set", "up.arm_at_start=false")

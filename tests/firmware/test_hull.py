@@ -53,6 +53,7 @@ async def gps() -> AsyncIterator[str]:
             os.close(descriptor)
 
 
+@pytest.mark.rotating(cpu_s=20)
 async def test_a_hull_starts_disarmed_and_without_a_simulator(tmp_path: Path) -> None:
     """A7: and without an estimate of its motion it does not move once it is armed either."""
     cv2.imwrite(str(tmp_path / "river.png"), river())

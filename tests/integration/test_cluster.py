@@ -128,6 +128,7 @@ def wait_for_drives(folder: Path, run: subprocess.Popen[str], count: int) -> Non
         time.sleep(0.05)
 
 
+@pytest.mark.rotating(cpu_s=20)
 def test_drives_on_a_cluster_are_those_here_though_a_worker_dies(tmp_path: Path, scheduler: Scheduler) -> None:
     """Killed in a drive of its own, a worker costs time alone: every result is there, with the bytes it has here."""
     workers = [scheduler.start_worker(), scheduler.start_worker()]
@@ -147,6 +148,7 @@ def test_drives_on_a_cluster_are_those_here_though_a_worker_dies(tmp_path: Path,
         assert result_path(tmp_path / "run", case).read_bytes() == result_path(tmp_path / "here", case).read_bytes()
 
 
+@pytest.mark.rotating(cpu_s=10)
 def test_what_interrupts_a_cluster_loses_no_drive(tmp_path: Path) -> None:
     """Ctrl-C at a terminal, which the workers get as well: what is done is stored and counted, and they end."""
     handler = signal.signal(signal.SIGINT, signal.SIG_DFL)  # a shell in the background ignores it, and so would a child

@@ -30,6 +30,7 @@ async def test_a_running_router_is_known_by_letting_us_in(private_sets: tuple[st
     assert theirs.state is State.FAIL
 
 
+@pytest.mark.rotating(cpu_s=10)
 def test_up_points_to_the_doctor(private_sets: tuple[str, ...]) -> None:
     """Without a driver for OpenGL there is no eye."""
     words = [word for setting in private_sets for word in ("--set", setting)]

@@ -157,6 +157,7 @@ def dated(layers: Iterable[int], pictures: Sequence[int]) -> set[int]:
     return {source_us for source_us in layers if source_us >= min(pictures)}
 
 
+@pytest.mark.rotating(cpu_s=20)
 def test_pictures_decode_and_are_those_of_the_bus(drive: tuple[Viewer, Log]) -> None:
     viewer, log = drive
     pictures = viewer.read("camera/picture")

@@ -42,6 +42,7 @@ def digest(file: Path) -> str:
     return hashlib.sha256(file.read_bytes()).hexdigest()
 
 
+@pytest.mark.rotating(cpu_s=10)
 def test_two_builds_give_the_same_bytes_as_does_one_of_the_source_distribution(
     wheel: Path, sdist: Path, tmp_path: Path
 ) -> None:
@@ -64,6 +65,7 @@ def test_a_wheel_holds_no_file_of_the_tests_and_every_one_that_runs(wheel: Path)
     assert not [name for name in names if name.startswith("tests")]
 
 
+@pytest.mark.rotating(cpu_s=30)
 def test_a_wheel_works_without_the_checkout(wheel: Path, tmp_path: Path, private_sets: tuple[str, ...]) -> None:
     """Version, help, weights, scenarios, statements and page; then a boat that drives by what was installed."""
     home = tmp_path / "venv"

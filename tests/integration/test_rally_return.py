@@ -42,6 +42,7 @@ HELD_M, HELD_US = 5.5, 5_000_000  # the station's radius is 4 m (`navigator.hold
 LIMIT_S = 90.0  # for 10 m at 0.6 m/s, on a machine that does other things too
 
 
+@pytest.mark.rotating(cpu_s=20)
 async def test_rtl_leads_to_the_rally_point_that_is_nearer_than_home(
     spawn: Spawn, open_as: OpenAs, config: Config, tmp_path: Path, transcript: Transcript
 ) -> None:

@@ -42,6 +42,7 @@ def words(folder: Path, *more: str) -> list[str]:
     return [*start, "--policy", "blind", "oracle", "--seeds", "1..2", *more]
 
 
+@pytest.mark.rotating(cpu_s=10)
 def test_drives_in_processes_are_those_in_this_one(tmp_path: Path) -> None:
     """W14: two processes side by side give the bytes that one gives; a second run drives nothing."""
     figures = tmp_path / "figures.json"
@@ -60,6 +61,7 @@ def test_drives_in_processes_are_those_in_this_one(tmp_path: Path) -> None:
     assert second.stdout == first.stdout
 
 
+@pytest.mark.rotating(cpu_s=10)
 @pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
 def test_an_interrupted_run_is_gone_on_with(tmp_path: Path, number: signal.Signals) -> None:
     """Ctrl-C or a kill: what is done stays and is summed up, the processes end, and the line says how to go on."""

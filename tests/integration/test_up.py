@@ -148,6 +148,7 @@ def test_no_orphan_survives_a_killed_supervisor(tmp_path: Path, private_sets: tu
     assert up.children() == {}
 
 
+@pytest.mark.rotating(cpu_s=20)
 def test_what_cannot_be_kept_alive_ends_all(
     tmp_path: Path, private_sets: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -162,6 +163,7 @@ def test_what_cannot_be_kept_alive_ends_all(
     assert up.children() == {}
 
 
+@pytest.mark.rotating(cpu_s=10)
 @pytest.mark.parametrize(
     ("words", "named"),
     [

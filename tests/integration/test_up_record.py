@@ -34,6 +34,7 @@ def has_driven(folder: Path, files: int) -> bool:
     return any(one.zero_cause is m.ZeroCause.NONE for one in recorded(open_log(found[-1].path), keys.THRUST_APPLIED))
 
 
+@pytest.mark.rotating(cpu_s=20)
 def test_a_drive_is_recorded_and_a_dead_recorder_stops_nothing(tmp_path: Path, private_sets: tuple[str, ...]) -> None:
     """The recorder is killed on the way: thrust goes on, a new file begins, the old one is mended."""
     folder, file = tmp_path / "drive", tmp_path / "s.json"
@@ -62,6 +63,7 @@ def test_a_drive_is_recorded_and_a_dead_recorder_stops_nothing(tmp_path: Path, p
     assert "eye/picture" not in before.topics, "the camera relays the same bytes"
 
 
+@pytest.mark.rotating(cpu_s=30)
 def test_a_folder_that_goes_away_stops_nothing_and_is_told_at_the_end(
     tmp_path: Path, private_sets: tuple[str, ...]
 ) -> None:

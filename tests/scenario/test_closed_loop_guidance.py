@@ -29,6 +29,7 @@ def test_l4_m3_follows_three_waypoints_of_the_lake(launch: Launch) -> None:
     assert max(off_m) < 2.5
 
 
+@pytest.mark.rotating(cpu_s=10)
 @pytest.mark.parametrize("name", ["lake", "river"])
 def test_with_perfect_sensors_cruise_is_smooth_and_on_the_line(launch: Launch, name: str) -> None:
     """With a perfect GPS and compass the guidance itself stays within 0.15 m of the route."""

@@ -12,6 +12,7 @@ from tests.kinematic_imazu import drive
 CASES = ("imazu-01", "imazu-05", "imazu-fair-02", "imazu-fair-05")
 
 
+@pytest.mark.rotating(cpu_s=10)
 @pytest.mark.parametrize("name", CASES)
 def test_the_boat_gives_way_early_and_to_the_side_that_the_rules_ask_for(name: str) -> None:
     """Each vessel is met by its class's own rule with 0.8 of 1 at least, and none comes nearer than 1 m."""

@@ -7,6 +7,7 @@ from paani_sim.worlds.generate import draw_random_scenario
 from tests.unit.paani_sim.worlds.fair_scenarios import check_is_fair
 
 
+@pytest.mark.rotating(cpu_s=30)
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize("name", sorted(FIXED_WORLDS))
 def test_fifty_scenarios_of_each_world_are_fair(name: str) -> None:

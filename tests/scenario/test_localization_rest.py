@@ -55,6 +55,7 @@ def at_quay(fixes: list[GpsFix], *, tilt_mps2: float, seed: int = 1) -> Iterator
             yield estimate, fix
 
 
+@pytest.mark.rotating(cpu_s=10)
 @pytest.mark.data
 @pytest.mark.skipif(not LOGS.is_dir(), reason=f"no logs at {LOGS}; set PAANI_DATA")
 def test_l5_a_recorded_moored_boat_is_not_read_as_motion() -> None:
@@ -145,6 +146,7 @@ def test_rest_is_found_again_after_a_voyage() -> None:
     assert sum(each.stopped for each in estimates) > 15 * 20
 
 
+@pytest.mark.rotating(cpu_s=10)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("drift_mps", "imu_gap_s", "seed"), [(0.0, 0.0, 1), (0.02, 0.0, 2), (0.04, 0.0, 3), (0.08, 0.0, 1), (0.04, 1.0, 2)]

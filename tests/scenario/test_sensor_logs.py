@@ -173,6 +173,7 @@ async def test_a_drive_of_known_truth_is_estimated_from_its_log() -> None:
         assert math.hypot(estimate.surge_mps, estimate.sway_mps) == pytest.approx(speed_mps, abs=0.25)
 
 
+@pytest.mark.rotating(cpu_s=10)
 @pytest.mark.data
 @pytest.mark.skipif(not LOGS.is_dir(), reason=f"no logs at {LOGS}; set PAANI_DATA")
 async def test_a_moored_boats_log_gives_the_same_fixes_over_the_wire_and_no_frozen_receiver() -> None:

@@ -37,6 +37,7 @@ def under_way(launch: Launch, profile: str) -> Lockstep:
     return boat
 
 
+@pytest.mark.rotating(cpu_s=10)
 def test_four_minutes_of_a_stuck_detection_turn_the_boat_no_further_than_the_cap(launch: Launch) -> None:
     """Resolution 15: a quarter turn, then rest, and the order says why."""
     boat = under_way(launch, "paani")
@@ -53,6 +54,7 @@ def test_the_papers_boat_goes_round_and_round(launch: Launch) -> None:
     assert max(map(abs, turned)) > 360.0
 
 
+@pytest.mark.rotating(cpu_s=20)
 @pytest.mark.parametrize("seed", range(5))
 def test_no_stuck_box_spins_the_boat(launch: Launch, seed: int) -> None:
     """Wherever it is and whatever is advised: no further than the cap either way."""

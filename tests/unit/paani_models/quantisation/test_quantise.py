@@ -199,6 +199,7 @@ def test_a_fully_quantised_detector_goes_blind_and_is_rejected(tmp_path: Path) -
     assert decision.reason.startswith("blind: best score")
 
 
+@pytest.mark.rotating(cpu_s=10)
 def test_with_its_decoding_in_float_the_detector_sees(tmp_path: Path) -> None:
     net, samples = verified_path("detector"), [detector_input(river(seed), (416, 320)) for seed in range(3)]
     quantise_network(net, tmp_path / "detector.onnx", RECIPES["equalised"]["detector"], samples)

@@ -84,6 +84,7 @@ def test_the_papers_detector_trained_here_has_the_stated_figures_v1_v4_v5_v6_v7(
         assert found.n == expected[metric].n == n
 
 
+@pytest.mark.rotating(cpu_s=10)
 @pytest.mark.data
 @needs_data
 def test_water_is_water_on_rivers_never_seen_in_training() -> None:

@@ -80,6 +80,7 @@ def test_water_moves_with_time(eye: Eye, river: World) -> None:
     assert step.max(axis=2)[water].mean() > 2.0
 
 
+@pytest.mark.rotating(cpu_s=10)
 @pytest.mark.parametrize("name", ["lake", "river", "canal", "harbour"])
 def test_picture_is_well_exposed_all_round_the_route(name: str) -> None:
     _require_gl()
@@ -324,6 +325,7 @@ def test_dataset_has_the_form_of_the_sources(tmp_path: Path) -> None:
     assert [(again / i.file).read_bytes() for i in stored.items] == [(out / i.file).read_bytes() for i in stored.items]
 
 
+@pytest.mark.rotating(cpu_s=20)
 @pytest.mark.parametrize("world", ["river", "canal"])
 def test_every_third_session_of_a_dataset_shows_nobody_but_crews(world: str) -> None:
     """Banks, boats and buoys as in the others, so that a detector learns what stands on a bank and is no person."""

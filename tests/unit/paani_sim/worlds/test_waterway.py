@@ -58,6 +58,7 @@ def test_a_seed_gives_one_waterway_and_another_seed_another(seed: int) -> None:
     assert not np.array_equal(build_waterway(seed).shore_m, build_waterway(seed + 1).shore_m)
 
 
+@pytest.mark.rotating(cpu_s=10)
 def test_scenarios_are_fair(scenarios: tuple[Scenario, ...]) -> None:
     for scenario in scenarios:
         check_is_fair(scenario)

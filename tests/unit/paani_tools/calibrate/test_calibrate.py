@@ -166,6 +166,7 @@ def test_a_near_shore_and_a_recording_without_evidence_are_refused(
     assert "no perception/evidence in it" in capsys.readouterr().err
 
 
+@pytest.mark.rotating(cpu_s=10)
 @pytest.mark.gl
 @pytest.mark.parametrize(("down_deg", "roll_deg"), [(6.0, 0.0), (9.0, 3.0)])
 def test_rendered_pictures_give_the_mount_to_0_3_degrees(down_deg: float, roll_deg: float) -> None:
