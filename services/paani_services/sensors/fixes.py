@@ -26,7 +26,10 @@ MAX_KNOTS = 1e6  # what can be sent; localization judges what a boat can do
 DAY_S, WEEK_S = 86_400.0, 604_800.0
 SET_FIXES = 2  # so many in order before the time is reached again from which it was set back
 RESYNC_FIXES = 5  # so many in order after a step back in time: the receiver's clock was set, not the line disturbed
-MEASURED_MODES = frozenset({"", "A", "D", "F", "P", "R"})  # others are estimated, simulated, typed in, or not valid
+# By the mode of a position or a speed, and by the quality of GGA (9: SBAS); others are estimated, simulated, typed in,
+# or not valid.
+MEASURED_MODES = frozenset({"", "A", "D", "F", "P", "R"})
+MEASURED_QUALITIES = frozenset({"1", "2", "3", "4", "5", "9"})
 NAV_PVT = b"\x01\x07"
 NAV_PVT_BYTES = 84  # of u-blox 7; later ones add 8
 FIX_TYPES = frozenset({2, 3, 4})  # 2D, 3D, GNSS with dead reckoning; 1 is dead reckoning alone
@@ -47,7 +50,7 @@ class FixDecoder:
     def __init__(self, drops: Counter[str]) -> None:
         self._drops = drops
         self._std_m: float | None = None  # of the last GST
-        self._hdop_std_m = UNKNOWN_STD_M  # by the last GGA
+        self._hdop_std_m, self._is_measured = UNKNOWN_STD_M, True  # by the last GGA
         self._course: Sentence | None = None  # the last VTG, until a GLL takes it
         self._has_rmc = self._has_pvt = False
         self._last_s, self._offset_s = -1.0, 0.0
@@ -63,8 +66,9 @@ class FixDecoder:
         fix: GpsFix | None = None
         match sentence.kind:
             case "GGA":
-                hdop = sentence.number("HDOP", 0.0) if sentence.text("quality") not in {"", "0"} else None
+                hdop = sentence.number("HDOP", 0.0)
                 self._hdop_std_m = RANGE_ERROR_M * min(hdop, WORST_HDOP) if hdop else UNKNOWN_STD_M
+                self._is_measured = sentence.text("quality") in MEASURED_QUALITIES
             case "GST":
                 stds_m = [sentence.number(name, 0.0) for name in ("stdLat", "stdLong")]
                 self._std_m = max((std_m for std_m in stds_m if std_m), default=None)
@@ -118,7 +122,8 @@ class FixDecoder:
         sog_mps, cog_rad = _speed_mps(course, speed_name), _course_of(course, course_name)
         has_speed = sog_mps is not None and cog_rad is not None
         is_speed_known = sog_mps is not None and (has_speed or sog_mps <= COURSELESS_MPS)
-        is_valid = position.text("status") == "A" and position.text("posMode") in MEASURED_MODES
+        modes = {position.text("posMode"), course.text("posMode")}
+        is_valid = position.text("status") == "A" and self._is_measured and modes <= MEASURED_MODES
         return GpsFix(
             source_us=round((day_s or 0.0) * 1e6),
             latitude_deg=latitude_deg or 0.0,

@@ -66,6 +66,28 @@ def test_a_position_marked_invalid_or_missing_is_no_fix() -> None:
     assert not drops
 
 
+@pytest.mark.parametrize("mode", ["E", "M", "N", "S"])
+def test_what_no_satellite_gave_is_no_fix_by_its_mode(mode: str) -> None:
+    """Dead reckoning, a position that was typed in, and a simulator."""
+    rmc = RMC.strip()[1:-3]
+    vtg, gll = "IIVTG,224.44,T,224.44,M,5.81,N,,,{}", "GPGLL,6005.071,S,02332.346,E,095559,A,{}"
+    for found in (
+        all_fixes(sentence(f"{rmc},{mode}")),
+        all_fixes(sentence(vtg.format("A")), sentence(gll.format(mode))),
+        all_fixes(sentence(vtg.format(mode)), sentence(gll.format("A"))),
+    ):
+        assert [fix.fix for fix in found[0]] == [False]
+
+
+@pytest.mark.parametrize("quality", ["", *"0123456789"])
+def test_what_no_satellite_gave_is_no_fix_by_the_quality_of_gga(quality: str) -> None:
+    """Of receivers whose RMC has no mode, and until another GGA says better."""
+    gga = sentence(f"GPGGA,123519,4807.038,N,01131.000,E,{quality},08,0.9,545.4,M,46.9,M,,")
+    (fix, later), _ = all_fixes(gga, RMC, GGA, sentence(RMC.strip()[1:-3].replace("123519", "123520")))
+    assert fix.fix is (quality in {"1", "2", "3", "4", "5", "9"})
+    assert later.fix
+
+
 def test_a_receiver_at_rest_that_shows_no_course_has_no_speed() -> None:
     (fix,), _ = all_fixes(sentence("GPRMC,123519,A,4807.038,N,01131.000,E,0.31,,230394,,"))
     assert fix.fix
