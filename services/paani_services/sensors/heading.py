@@ -8,6 +8,7 @@ from paani_services.sensors.sentences import Sentence, course_rad
 
 MAX_GAP_S = 0.2  # between samples of the gyro; across a longer gap a heading is not carried on
 MAX_VARIATION_DEG = 180.0  # near the magnetic poles
+PREFERRED = ("HDT", "THS", "HDG", "HDM")  # what is true first, then what may bring its own variation
 
 
 class Heading(NamedTuple):
@@ -53,6 +54,30 @@ def _signed(sentence: Sentence, name: str) -> float | None:
     if side not in {"E", "W"}:
         raise ValueError(f"{sentence.kind} {name}EW: {side}")
     return value if side == "E" else -value
+
+
+class SourceChoice:
+    """Which instrument gives the heading where several do: two that differ would turn the boat from one to the other.
+
+    One that is preferred takes over at once, any other after the present one gave none for `silent_s`.
+    """
+
+    def __init__(self, silent_s: float) -> None:
+        self._silent_s = silent_s
+        self._chosen: Sentence | None = None  # its newest
+        self._chosen_us = 0
+
+    def takes(self, sentence: Sentence, now_us: int) -> bool:
+        """Whether a heading of this sentence is to be used."""
+        chosen = self._chosen if (now_us - self._chosen_us) * 1e-6 <= self._silent_s else None
+        if chosen is not None and sentence.source != chosen.source and _rank(sentence) >= _rank(chosen):
+            return False
+        self._chosen, self._chosen_us = sentence, now_us
+        return True
+
+
+def _rank(sentence: Sentence) -> int:
+    return PREFERRED.index(sentence.kind)
 
 
 class YawKeeper:

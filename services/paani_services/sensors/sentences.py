@@ -46,6 +46,11 @@ class Sentence:
         self.kind = kind
         self._texts, self._values = texts, values
 
+    @property
+    def source(self) -> str:
+        """Talker and kind: one stream of an instrument, where several speak on a line."""
+        return f"{self._values.talker}{self.kind}"
+
     def text(self, name: str) -> str:
         """The field as it was written, "" where it is missing."""
         return self._texts.get(name, "")

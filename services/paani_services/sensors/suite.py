@@ -25,7 +25,7 @@ from paani_services.sensors.freezing import (
     SampleWatch,
     TurnWatch,
 )
-from paani_services.sensors.heading import YawKeeper, read_heading, true_yaw_rad
+from paani_services.sensors.heading import SourceChoice, YawKeeper, read_heading, true_yaw_rad
 from paani_services.sensors.inertial import InertialSample, Mounting, imu_message, read_sample
 from paani_services.sensors.lidar_packets import TurnAssembler, scan_message
 from paani_services.sensors.receipt_clock import ReceiptClock
@@ -84,6 +84,7 @@ class SensorSuite:
         self._sample_watch, self._gravity_watch, self._sample_us = SampleWatch(), GravityWatch(), 0
         self._sample_clock, self._device_ms = ReceiptClock(), 0
         self._heading_watch, self._yaw = HeadingWatch(), YawKeeper(config.heading.max_age_s)
+        self._heading_choice = SourceChoice(config.heading.max_age_s)
         self._ais = AisReports(self.drops, config.ais.own_mmsi)
         self._depths = DepthDecoder(self.drops, config.sonar.transducer_m)
 
@@ -109,6 +110,7 @@ class SensorSuite:
                     self._turns, self._turn_watch = TurnAssembler(self._config.lidar), TurnWatch()
                 case SensorRole.HEADING:
                     self._heading_watch = HeadingWatch()
+                    self._heading_choice = SourceChoice(self._config.heading.max_age_s)
                     self._yaw.forget()
                 case SensorRole.SONAR:
                     self._depths = DepthDecoder(self.drops, self._config.sonar.transducer_m)
@@ -245,6 +247,8 @@ class SensorSuite:
         yaw_rad, problem = read_heading(sentence, config.variation_deg, config.heading.offset_deg)
         if yaw_rad is None:
             device.problem = problem
+            return
+        if not self._heading_choice.takes(sentence, now_us):
             return
         self._heading_watch.take_heading(yaw_rad)
         self._yaw.take_heading(yaw_rad, now_us)
