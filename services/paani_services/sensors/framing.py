@@ -1,5 +1,7 @@
 """Frames of a byte stream that comes in chunks: NMEA 0183 sentences and UBX messages, also mixed on one line. Pure."""
 
+import functools
+import operator
 import re
 from enum import StrEnum
 from typing import NamedTuple
@@ -11,6 +13,9 @@ MAX_SENTENCE = 160
 MAX_UBX_PAYLOAD = 1024  # NAV-SAT of 80 satellites has 968 bytes; a longer one is noise that looks like a header
 _START = re.compile(rb"[$!\xb5]")
 _BODY = re.compile(rb"[$!][\x20\x22\x23\x25-\x7e]*")  # printable characters up to the end or the next start
+
+_SENTENCE = re.compile(rb"[$!]([\x20\x22\x23\x25-\x29\x2b-\x7e]+)\*([0-9A-Fa-f]{2})\r?\n")
+_UBX = re.compile(re.escape(UBX_HDR) + rb"..(..)", re.DOTALL)
 
 
 class Protocol(StrEnum):
@@ -31,7 +36,7 @@ class Framer:
     """Cuts frames out of the bytes it is fed; keeps at most one unfinished frame.
 
     What cannot be a frame is skipped up to the next byte that may begin one, so that a false start hides nothing after
-    it.
+    it. A UBX message that is unfinished, and has a whole frame within, is such a false start.
     """
 
     def __init__(self) -> None:
@@ -89,7 +94,10 @@ class Framer:
             return self._skip(2)
         size = payload + 8
         if len(waiting) < size:
-            return 0
+            if not _holds_frame(bytes(waiting[2:])):
+                return 0
+            self.ubx_failures += 1
+            return self._skip(2)
         if not isvalid_checksum(bytes(waiting[:size])):
             self.ubx_failures += 1
             return self._skip(2)
@@ -108,3 +116,16 @@ class Framer:
                 return end + (2 if after == b"\r\n" else 1)
         self.cut_sentences += 1
         return self._skip(end)
+
+
+def _holds_frame(data: bytes) -> bool:
+    """Whether a whole frame whose checksum fits lies within: what seems to go round it has a damaged length."""
+    for found in _SENTENCE.finditer(data):
+        if functools.reduce(operator.xor, found[1]) == int(found[2], 16):
+            return True
+    for found in _UBX.finditer(data):
+        size = int.from_bytes(found[1], "little") + 8
+        frame = data[found.start() : found.start() + size]
+        if len(frame) == size and isvalid_checksum(frame):
+            return True
+    return False

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from paani_services.sensors.framing import MAX_SENTENCE, Frame, Framer, Protocol
+from paani_services.sensors.framing import MAX_SENTENCE, MAX_UBX_PAYLOAD, Frame, Framer, Protocol
 from tests.unit.paani_services.sensors.written import nav_pvt, rmc, sentence, ubx
 
 STREAM = [rmc(), nav_pvt(), sentence("IIHDT,12.3,T").encode(), ubx(b"\x01\x03", b"$GP\n\xb5\x62" * 2), rmc("123520")]
@@ -44,6 +45,24 @@ def test_a_false_ubx_header_hides_no_sentence() -> None:
     assert framer.ubx_failures == 1
     assert feed(b"\xb5\x62\x01\x07\xff\xff" + rmc()) == [rmc()]
     assert feed(b"\xb5" + rmc(), b"\xb5\xb5\x62" + nav_pvt()[2:]) == [rmc(), nav_pvt()]
+
+
+@pytest.mark.parametrize("whole", [rmc(), nav_pvt(2000)])
+def test_a_damaged_length_holds_nothing_up(whole: bytes) -> None:
+    """A message that seems to go on for a thousand bytes would keep a receiver's fixes for ten seconds."""
+    framer = Framer()
+    damaged = bytearray(nav_pvt())
+    damaged[4:6] = MAX_UBX_PAYLOAD.to_bytes(2, "little")
+    assert framer.feed(bytes(damaged) + whole[:-1]) == []
+    assert [frame.data for frame in framer.feed(whole[-1:])] == [whole]
+    assert framer.ubx_failures == 1
+
+
+def test_what_looks_like_a_frame_within_a_message_is_part_of_it() -> None:
+    """Its checksum does not fit."""
+    within = rmc().replace(b"*", b"*F")[:-3] + b"\r\n" + nav_pvt()[:-1] + b"\x00"
+    whole = ubx(b"\x01\x03", within * 3)
+    assert feed(whole[:-1], whole[-1:]) == [whole]
 
 
 def test_a_line_without_end_is_dropped_once_it_is_too_long() -> None:
