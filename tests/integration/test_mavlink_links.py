@@ -18,6 +18,7 @@ import pytest
 from paani import keys
 from paani import messages as m
 from paani.clock import WallClock
+from paani_services.mavlink.signing import MINUTE, STAMP_FILE, read_signing_key, stamp_of
 from tests.at_work import at_work
 from tests.conftest import OpenAs, Spawn, find_free_port
 from tests.mavlink_peer import in_order
@@ -34,8 +35,8 @@ class Client:
 
     def __init__(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self.reader, self.writer = reader, writer
-        self._codec = common.MAVLink(None, 255, 190)
-        self._codec.robust_parsing = True
+        self.codec = common.MAVLink(None, 255, 190)
+        self.codec.robust_parsing = True
         self._messages: list[Any] = []
 
     @classmethod
@@ -43,7 +44,7 @@ class Client:
         return cls(*await asyncio.open_connection("127.0.0.1", port))
 
     def send(self, message: Any) -> None:
-        self.writer.write(message.pack(self._codec))
+        self.writer.write(message.pack(self.codec))
 
     async def until(self, kind: str) -> Any:
         """The next message of this kind."""
@@ -54,7 +55,7 @@ class Client:
                         return message
                 data = await self.reader.read(4096)
                 assert data
-                self._messages += self._codec.parse_buffer(data) or []
+                self._messages += self.codec.parse_buffer(data) or []
 
 
 async def test_noise_floods_and_deaf_stations_hold_back_nobody(spawn: Spawn, open_as: OpenAs) -> None:
@@ -300,6 +301,28 @@ async def test_mavproxy_signs_and_is_obeyed_and_before_is_not(spawn: Spawn, open
         finally:
             process.kill()
             await process.wait()
+
+
+async def test_what_is_signed_is_newer_than_in_every_run_before(spawn: Spawn, tmp_path: Path) -> None:
+    """Also by a clock that stood still meanwhile."""
+    tcp, key, stamp = find_free_port(), tmp_path / "key", tmp_path / "runtime" / STAMP_FILE
+    key.write_text("secret")
+    key.chmod(0o600)
+    links = (f"mavlink.tcp=127.0.0.1:{tcp}", 'mavlink.udp=""', f"mavlink.signing_key_file={key}")
+    begun = stamp_of(CLOCK.now_us())
+    async with spawn("mavlink", *links), asyncio.timeout(10.0):
+        while not stamp.exists():
+            await asyncio.sleep(0.01)
+    assert begun < int(stamp.read_text()) < begun + MINUTE
+    ahead = begun + 60 * MINUTE
+    stamp.write_text(str(ahead))
+    async with spawn("mavlink", *links):
+        client = await Client.connect(tcp)
+        signing = client.codec.signing
+        signing.secret_key = await asyncio.to_thread(read_signing_key, str(key))
+        assert (await client.until("HEARTBEAT")).get_signed()
+        assert ahead < signing.timestamp < ahead + MINUTE
+        client.writer.close()
 
 
 @pytest.mark.parametrize(

@@ -14,12 +14,13 @@ from paani.config import Config
 from paani.mission_client import MissionClient
 from paani.operator_client import OperatorClient
 from paani.port_address import tcp_address
+from paani.runtime import runtime_path
 from paani_services.mavlink.acts import Acts, is_link_lost
 from paani_services.mavlink.camera import Camera, Stream
 from paani_services.mavlink.endpoints import Endpoints
 from paani_services.mavlink.gateway import Gateway
 from paani_services.mavlink.log_files import serve_logs
-from paani_services.mavlink.signing import Signer, read_signing_key
+from paani_services.mavlink.signing import STAMP_FILE, Signer, read_signing_key, read_stamp, save_stamps
 from paani_services.mavlink.snapshot import TOPICS, Snapshot
 from paani_services.mavlink.trials import Trials
 from paani_services.mavlink.video import Video
@@ -59,9 +60,10 @@ def stream_of(config: Config, video: Video) -> Stream | None:
 async def run(bus: Bus, clock: Clock, config: Config) -> None:
     """Serve ground stations until told to stop. Raises UserError for an address or a key that cannot be had."""
     settings = config.mavlink
-    signer = None
+    signer, stamp_file = None, runtime_path(config.bus) / STAMP_FILE
     if settings.signing_key_file:
-        signer = Signer(await asyncio.to_thread(read_signing_key, settings.signing_key_file), clock.now_us())
+        key = await asyncio.to_thread(read_signing_key, settings.signing_key_file)
+        signer = Signer(key, clock.now_us(), await asyncio.to_thread(read_stamp, stamp_file))
     inputs = Inputs(bus, clock)
     client = OperatorClient(bus, clock)
     acts = Acts(
@@ -82,6 +84,8 @@ async def run(bus: Bus, clock: Clock, config: Config) -> None:
         await video.open()
         async with asyncio.TaskGroup() as tasks:
             tasks.create_task(video.show_pictures())
+            if signer is not None:
+                tasks.create_task(save_stamps(stamp_file, signer))
             tasks.create_task(serve_logs(gateway.logs, config.recorder.folder, clock))
             with bus.alive():
                 LOG.info("MAVLink to udp %s, at tcp %s", settings.udp or "nowhere", settings.tcp or "nowhere")

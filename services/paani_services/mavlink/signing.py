@@ -1,19 +1,28 @@
-"""MAVLink 2 message signing: https://mavlink.io/en/guide/message_signing.html. Pure but for reading the key's file."""
+"""MAVLink 2 message signing: https://mavlink.io/en/guide/message_signing.html. Pure but for its files."""
 
 from __future__ import annotations
 
+import asyncio
 import hashlib
 import hmac
+import logging
 import os
 import stat
 from pathlib import Path
 
 from paani.errors import UserError
+from paani.runtime import write_private
+
+LOG = logging.getLogger(__name__)
 
 EPOCH_US = 1_420_070_400_000_000  # 2015-01-01 00:00 UTC, where the protocol's stamps begin, in steps of 10 us
 SIGNATURE_BYTES = 6
 BLOCK_BYTES = 13  # link id, stamp of 48 bits, signature
 MAX_PASSPHRASE_BYTES = 4096
+MINUTE = 6_000_000  # stamps; a stream that is new is no further behind
+MAX_DIGITS = 15  # of 48 bits
+STAMP_FILE = "mavlink-stamp"  # in the runtime folder
+SAVE_PERIOD_S = 10.0  # the standard asks for a minute at most
 
 
 def stamp_of(unix_us: int) -> int:
@@ -22,16 +31,17 @@ def stamp_of(unix_us: int) -> int:
 
 
 class Signer:
-    """The key of all links, and the newest stamp of each signed stream.
+    """The key of all links, the newest stamp of each signed stream, and the newest of all, sent or taken.
 
-    A frame is authentic if its signature is the key's, and its stamp newer than that of its stream's last, and than the
-    start of this process: what was recorded before that is never taken again.
+    A frame is authentic if its signature is the key's, and its stamp newer than that of its stream's last. The first
+    of a stream is newer than the start of this process, by the clock and by `saved`, the newest of an earlier run, and
+    at most a minute behind the newest of all: what was recorded before is never taken again, whatever the clock says.
     """
 
-    def __init__(self, key: bytes, started_us: int) -> None:
+    def __init__(self, key: bytes, started_us: int, saved: int = 0) -> None:
         self.key = key
-        self._started = self._newest_sent = stamp_of(started_us)
-        self._newest: dict[tuple[int, int, int], int] = {}
+        self._started = self.newest = max(stamp_of(started_us), saved)
+        self._streams: dict[tuple[int, int, int], int] = {}
 
     def is_authentic(self, frame: bytes, system: int, component: int) -> bool:
         """Whether a whole frame that ends in a signature block was signed with the key, and is no repetition."""
@@ -40,15 +50,44 @@ class Signer:
             return False
         stream = (frame[-BLOCK_BYTES], system, component)
         stamp = int.from_bytes(frame[1 - BLOCK_BYTES : -SIGNATURE_BYTES], "little")
-        if stamp <= self._newest.get(stream, self._started):
+        if stamp <= self._streams.get(stream, max(self._started, self.newest - MINUTE)):
             return False
-        self._newest[stream] = stamp
+        self._streams[stream] = stamp
+        self.newest = max(self.newest, stamp)  # a station whose clock is ahead of ours takes nothing that is far behind
         return True
 
     def next_stamp(self, now_us: int) -> int:
         """A stamp for a frame that is sent now, newer than every one before, whatever becomes of the clock."""
-        self._newest_sent = max(self._newest_sent + 1, stamp_of(now_us))
-        return self._newest_sent
+        self.newest = max(self.newest + 1, stamp_of(now_us))
+        return self.newest
+
+
+def read_stamp(file: Path) -> int:
+    """The newest stamp of an earlier run; 0 where there was none. Raises UserError for a file that does not say it."""
+    try:
+        digits = file.read_bytes()
+    except FileNotFoundError:
+        return 0
+    except OSError as error:
+        raise UserError(f"{file}: {error.strerror}") from error
+    if not digits.isdigit() or len(digits) > MAX_DIGITS:
+        raise UserError(f"{file}: holds no stamp; set the clock, and remove the file")
+    return int(digits)
+
+
+def save_stamp(file: Path, stamp: int) -> None:
+    """Replace the file. Where that fails, the next run knows this one by the clock alone."""
+    try:
+        write_private(file, str(stamp))
+    except OSError as error:
+        LOG.warning("%s: %s; the clock alone tells the next start what was signed before", file, error.strerror)
+
+
+async def save_stamps(file: Path, signer: Signer) -> None:
+    """Save the newest stamp now and regularly, for ever."""
+    while True:
+        await asyncio.to_thread(save_stamp, file, signer.newest)
+        await asyncio.sleep(SAVE_PERIOD_S)
 
 
 def read_signing_key(file: str) -> bytes:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import hashlib
 from pathlib import Path
 
@@ -11,8 +12,17 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import common
 
 from paani.errors import UserError
+from paani_services.mavlink import signing
 from paani_services.mavlink.codec import Codec
-from paani_services.mavlink.signing import Signer, read_signing_key, stamp_of
+from paani_services.mavlink.signing import (
+    MINUTE,
+    Signer,
+    read_signing_key,
+    read_stamp,
+    save_stamp,
+    save_stamps,
+    stamp_of,
+)
 from tests.mavlink_peer import NOW_US, Peer, Port, armed, in_order
 
 KEY = hashlib.sha256(b"correct horse").digest()
@@ -26,6 +36,10 @@ def signed(key: bytes, stamp: int, link_id: int = 7, system: int = 255) -> bytes
     sender.signing.secret_key, sender.signing.sign_outgoing = key, True
     sender.signing.link_id, sender.signing.timestamp = link_id, stamp
     return bytes(DISARM.pack(sender))
+
+
+def is_taken(signer: Signer, stamp: int, link_id: int = 7) -> bool:
+    return signer.is_authentic(signed(KEY, stamp, link_id), 255, 190)
 
 
 def port() -> tuple[Port, Peer]:
@@ -57,6 +71,64 @@ def test_what_was_signed_before_the_start_is_not_obeyed() -> None:
     made, peer = port()
     peer.send_bytes(signed(KEY, stamp_of(NOW_US)))
     assert made.asked == []
+
+
+def test_what_an_earlier_run_has_heard_is_not_obeyed_by_a_clock_that_was_set_back() -> None:
+    before = Signer(KEY, NOW_US)
+    station = before.next_stamp(NOW_US) + 7 * MINUTE  # its clock is ahead of ours
+    assert is_taken(before, station)
+    after = Signer(KEY, NOW_US - 3_600_000_000, before.newest)
+    assert not is_taken(after, station)
+    assert is_taken(after, station + 1)
+
+
+def test_what_was_held_back_for_a_minute_begins_no_stream() -> None:
+    """Of one that is known it is late and no repetition: a link may be slow."""
+    signer = Signer(KEY, NOW_US)
+    assert is_taken(signer, LATER, link_id=1)
+    held_back = signer.next_stamp(NOW_US + 120_000_000) - MINUTE
+    assert not is_taken(signer, held_back, link_id=2)
+    assert is_taken(signer, held_back, link_id=1)
+    assert is_taken(signer, held_back + 1, link_id=2)
+
+
+def test_a_station_whose_clock_is_ahead_takes_what_is_sent() -> None:
+    """By pymavlink's reader, which takes no new stream that is over a minute behind."""
+    signer = Signer(KEY, NOW_US)
+    reader = common.MAVLink(None, 255, 190)
+    reader.robust_parsing = True
+    reader.signing.secret_key, reader.signing.timestamp = KEY, LATER + 60 * MINUTE
+    (refused,) = reader.parse_buffer(Codec(1, signer).encode(DISARM, NOW_US))
+    assert refused.get_type() == "BAD_DATA"
+    assert is_taken(signer, LATER + 60 * MINUTE)
+    (taken,) = reader.parse_buffer(Codec(2, signer).encode(DISARM, NOW_US))
+    assert taken.get_type() == "COMMAND_LONG"
+
+
+async def test_the_newest_stamp_is_saved_again_and_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(signing, "SAVE_PERIOD_S", 0.0)
+    file, signer = tmp_path / "stamp", Signer(KEY, NOW_US)
+    assert await asyncio.to_thread(read_stamp, file) == 0
+    saving = asyncio.create_task(save_stamps(file, signer))
+    for _ in range(2):
+        async with asyncio.timeout(10.0):
+            while await asyncio.to_thread(read_stamp, file) != signer.newest:
+                pass
+        signer.next_stamp(NOW_US)
+    saving.cancel()
+
+
+@pytest.mark.parametrize("content", [b"", b"-1", b"x", b"\xff", b"1" * 5000])
+def test_a_file_that_holds_no_stamp_is_refused(content: bytes, tmp_path: Path) -> None:
+    file = tmp_path / "stamp"
+    file.write_bytes(content)
+    with pytest.raises(UserError, match=r"stamp: holds no stamp"):
+        read_stamp(file)
+
+
+def test_a_stamp_that_cannot_be_saved_is_told(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    save_stamp(tmp_path / "absent" / "stamp", 1)
+    assert "No such file" in caplog.text
 
 
 @pytest.mark.parametrize("frame", [signed(b"x" * 32, LATER), Peer.pack(None, DISARM)])  # type: ignore[arg-type]
