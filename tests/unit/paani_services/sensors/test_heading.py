@@ -6,8 +6,10 @@ import math
 
 import pytest
 
+from paani.messages import ImuSample
 from paani_services.sensors.heading import Heading, YawKeeper, read_heading, true_yaw_rad
 from paani_services.sensors.sentences import read_sentence
+from tests.unit.paani_services.sensors.sensor_bench import HEADING, Bench
 from tests.unit.paani_services.sensors.written import sentence
 
 
@@ -90,3 +92,22 @@ def test_a_magnetic_yaw_is_used_with_the_variation_alone() -> None:
     assert true_yaw_rad(1.0, "magnetic", None) is None
     assert true_yaw_rad(1.0, "magnetic", 10.0) == pytest.approx(1.0 - math.radians(10.0))
     assert true_yaw_rad(1.0, "none", 10.0) is None
+
+
+def test_of_several_instruments_one_gives_the_heading_until_it_is_silent() -> None:
+    """HDG reads 8 degrees less than both HDT, which differ by 30."""
+
+    def headings(*bodies: str, rounds: int = 5) -> list[int]:
+        found: list[ImuSample] = []
+        for _ in range(rounds):
+            bench.suite.take(HEADING, b"".join(sentence(body).encode() for body in bodies), bench.now_us)
+            found += bench.run_imu(0.3)
+        return [round(90.0 - math.degrees(each.yaw_rad)) for each in found if each.orientation_available]
+
+    bench = Bench()
+    compass, pair, other = "HCHDG,80.0,,,2.0,E", "HEHDT,90.0,T", "HCHDT,120.0,T"
+    assert set(headings(compass)) == {82}
+    assert set(headings(compass, pair)) == {90}  # it is preferred
+    assert set(headings(other, compass, pair)) == {90}
+    assert headings(other, compass, rounds=6) == [90] * 120 + [120] * 30  # none in between: the last is too old
+    assert set(headings("HCHDT,,T", compass, rounds=6)[-30:]) == {82}

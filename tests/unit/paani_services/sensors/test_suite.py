@@ -166,25 +166,6 @@ def test_the_orientation_becomes_unavailable_when_the_compass_falls_silent() -> 
     assert (last - START_US) * 1e-6 == pytest.approx(1.5, abs=0.02)
 
 
-def test_of_several_instruments_one_gives_the_heading_until_it_is_silent() -> None:
-    """HDG reads 8 degrees less than both HDT, which differ by 30."""
-
-    def headings(*bodies: str, rounds: int = 5) -> list[int]:
-        found: list[ImuSample] = []
-        for _ in range(rounds):
-            bench.suite.take(HEADING, b"".join(sentence(body).encode() for body in bodies), bench.now_us)
-            found += bench.run_imu(0.3)
-        return [round(90.0 - math.degrees(each.yaw_rad)) for each in found if each.orientation_available]
-
-    bench = Bench()
-    compass, pair, other = "HCHDG,80.0,,,2.0,E", "HEHDT,90.0,T", "HCHDT,120.0,T"
-    assert set(headings(compass)) == {82}
-    assert set(headings(compass, pair)) == {90}  # it is preferred
-    assert set(headings(other, compass, pair)) == {90}
-    assert headings(other, compass, rounds=6) == [90] * 120 + [120] * 30  # none in between: the last is too old
-    assert set(headings("HCHDT,,T", compass, rounds=6)[-30:]) == {82}
-
-
 def test_a_nine_axis_unit_gives_its_own_yaw_only_if_its_north_is_known() -> None:
     line = sentence("VNYMR,10.0,0.0,0.0,0,0,0,0.01,0.02,-9.81,0,0,0.1").encode()
     for variation_deg, yaw_deg in ((None, None), (5.0, 75.0)):
