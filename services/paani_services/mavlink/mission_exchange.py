@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from paani import messages as m
+from paani.clock import has_passed
 from paani.geometry import enu_from_geodetic
 from paani.map_origin import map_origin_deg
 from paani.missions import MAX_RALLY
@@ -29,6 +30,8 @@ ACCEPTED, UNSUPPORTED = dialect.MAV_MISSION_ACCEPTED, dialect.MAV_MISSION_UNSUPP
 INVALID_SEQUENCE, DENIED = dialect.MAV_MISSION_INVALID_SEQUENCE, dialect.MAV_MISSION_DENIED
 NO_PARTS = "mission: whole or not at all"
 NO_PLACE = "mission: the boat does not know its place yet"
+NO_NAVIGATOR = "mission: not known, the navigator is silent"
+LISTENS_S = 5.0  # after which a navigator that publishes no mission has none: it says one twice in this time
 NO_LEGS = Legs((), {})
 NO_KEY = ((object(),) * 3, object(), 0, 0)  # of a plan of nothing: no mission is equal to it
 
@@ -60,6 +63,8 @@ class MissionExchange:
         self._newest: Uploaded | None = None  # which may be refused
         self._uploads, self._upload_count = Uploads(count), 0
         self._current = self._reached = self._leg_index = 0
+        self._asked_us: dict[tuple[Station, Source, int], int] = {}  # for a list of a type that is not known yet
+        self._heard_us: int | None = None  # since when the navigator gives orders
         self.handlers: dict[str, Callable[[Station, Any, Source], None]] = {
             "MISSION_REQUEST_LIST": self._request_list,
             "MISSION_REQUEST_INT": self._request,
@@ -94,6 +99,11 @@ class MissionExchange:
                 if self._newest is not None and self._newest.legs.legs == legs:
                     self._uploaded = self._newest
                 self._plan, self._plan_key = plan_of(snapshot, self._uploaded), key
+        if snapshot.command is None:
+            self._heard_us = None
+        elif self._heard_us is None:
+            self._heard_us = snapshot.now_us
+        self._answer_lists()
         return self._news(snapshot)
 
     def shows(self, order: MissionOrder) -> bool:
@@ -106,6 +116,7 @@ class MissionExchange:
     def forget(self, station: Station) -> None:
         """A station whose link has ended."""
         self._uploads.forget(station)
+        self._asked_us = {asked: us for asked, us in self._asked_us.items() if asked[0] is not station}
 
     def _news(self, snapshot: Snapshot) -> list[Any]:
         command = snapshot.command
@@ -125,9 +136,32 @@ class MissionExchange:
 
     def _request_list(self, station: Station, message: Any, source: Source) -> None:
         if message.mission_type in {MISSION, FENCE, RALLY}:
-            station.send(missions.mission_count(self._plan, message.mission_type, source), self._snapshot.now_us)
+            self._asked_us.setdefault((station, source, message.mission_type), self._snapshot.now_us)
+            self._answer_lists()
         else:
             self._refuse(station, UNSUPPORTED, message, source, "")
+
+    def _answer_lists(self) -> None:
+        """A count of none would be that of an empty mission: what is not known is waited for, and then refused."""
+        snapshot = self._snapshot
+        for (station, source, kind), asked_us in tuple(self._asked_us.items()):
+            if self._is_known(kind):
+                station.send(missions.mission_count(self._plan, kind, source), snapshot.now_us)
+            elif has_passed(max(asked_us, self._heard_us or 0), LISTENS_S * 1e6, snapshot.now_us):
+                self._count("mavlink_refused")
+                text = NO_NAVIGATOR if snapshot.legs is None else NO_PLACE
+                acknowledge(station, source, DENIED, kind, snapshot.now_us, text)
+            else:
+                continue
+            del self._asked_us[station, source, kind]
+
+    def _is_known(self, kind: int) -> bool:
+        """Whether the plan says what there is of this type: with its places, or because there is none."""
+        snapshot = self._snapshot
+        if snapshot.legs is None:
+            return self._heard_us is not None and has_passed(self._heard_us, LISTENS_S * 1e6, snapshot.now_us)
+        places = {MISSION: snapshot.legs, FENCE: snapshot.fence, RALLY: snapshot.rally}
+        return self._plan_key is not NO_KEY or not places[kind]
 
     def _request(self, station: Station, message: Any, source: Source) -> None:
         kind = message.mission_type

@@ -142,7 +142,7 @@ def mission_current(snapshot: Snapshot, plan: Plan) -> Any:
     has_home = bool(items) and (items[0].command, items[0].frame) == (WAYPOINT, GLOBAL)
     total = len(items) - has_home  # the protocol does not count home
     is_route = mode_of(snapshot) is Mode.AUTO
-    if snapshot.command is None:
+    if snapshot.command is None or (snapshot.legs and not items):
         state = dialect.MISSION_STATE_UNKNOWN
     elif total == 0:
         state = dialect.MISSION_STATE_NO_MISSION

@@ -126,6 +126,7 @@ def test_how_far_the_mission_is() -> None:
     assert state(armed(command=done)) == common.MISSION_STATE_COMPLETE
     assert state(armed(command=None)) == common.MISSION_STATE_UNKNOWN
     assert mission_current(armed(), EMPTY).mission_state == common.MISSION_STATE_NO_MISSION
+    assert mission_current(armed(mission=WHOLE), EMPTY).mission_state == common.MISSION_STATE_UNKNOWN
     home_alone = plan_of(in_order(mission=m.Mission(source_us=NOW_US, name="", legs=()), prediction=KNOWN_HOME))
     for nothing in (EMPTY, home_alone):
         current = mission_current(armed(), nothing)
