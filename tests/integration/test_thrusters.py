@@ -15,6 +15,7 @@ from paani.bus import Bus
 from paani.clock import stopwatch_ms
 from paani.config import Config, load_config
 from paani.errors import UserError
+from paani.microcontroller.rpc import Request
 from paani_services.thrusters.service import run
 from tests.at_work import at_work
 from tests.mcu_peer import PtyLine, until
@@ -201,3 +202,21 @@ async def test_a_microcontroller_that_falls_silent_gives_zero_within_its_lease(b
     assert stopwatch_ms() - started_ms < boat.peer.lease_ms + 300.0
     await until(lambda: boat.state.value is not None and "no answer from the mic" in boat.state.value.problem)
     await until(lambda: boat.state.value is not None and boat.state.value.mcu is m.McuState.UNKNOWN)
+
+
+async def test_a_microcontroller_whose_answers_are_lost_is_told_to_lie_still(boat: Boat) -> None:
+    """It would drive on, and nobody would know; and a STOP counts only when the last frame's lease is over."""
+    await boat.drive()
+    answer = boat.peer.answer
+
+    def lose(request: Request) -> bytes:
+        answer(request)
+        return b""
+
+    boat.peer.answers = lose
+    await until(lambda: boat.peer.newest.left == boat.peer.newest.right == 0.0)
+    assert boat.peer.newest.armed
+    assert all(call.left == 0.2 for _, call in boat.peer.thrusts[-3:-1])
+    assert boat.peer.thrusts[-1][0] - boat.peer.thrusts[-2][0] < 2 * boat.peer.lease_ms
+    boat.peer.answers = answer
+    await until(lambda: boat.peer.newest.left == 0.2)

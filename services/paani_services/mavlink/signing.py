@@ -75,18 +75,20 @@ def read_stamp(file: Path) -> int:
     return int(digits)
 
 
-def save_stamp(file: Path, stamp: int) -> None:
-    """Replace the file. Where that fails, the next run knows this one by the clock alone."""
-    try:
-        write_private(file, str(stamp))
-    except OSError as error:
-        LOG.warning("%s: %s; the clock alone tells the next start what was signed before", file, error.strerror)
-
-
 async def save_stamps(file: Path, signer: Signer) -> None:
-    """Save the newest stamp now and regularly, for ever."""
+    """Save the newest stamp now and regularly, for ever.
+
+    Where that fails, which is told once, the next run knows this one by the clock alone.
+    """
+    told = ""
     while True:
-        await asyncio.to_thread(save_stamp, file, signer.newest)
+        try:
+            await asyncio.to_thread(write_private, file, str(signer.newest))
+        except OSError as error:
+            problem = f"{file}: {error.strerror}; the clock alone tells the next start what was signed before"
+            if problem != told:
+                LOG.warning("%s", problem)
+            told = problem
         await asyncio.sleep(SAVE_PERIOD_S)
 
 

@@ -36,6 +36,7 @@ class EscOutput:
         """One call: settings first, for each session; without a word of the operator a question alone.
 
         The microcontroller takes a disarmed frame as the operator's leave to arm again, so nothing but his word is one.
+        One that has not answered for a lease is told to lie still: nobody here would know what it does.
         """
         if not self._caller.is_connected:
             return
@@ -46,9 +47,7 @@ class EscOutput:
 
     def applied(self, decided: AppliedThrust, now_ms: float) -> AppliedThrust:
         """The decision, unless the microcontroller withholds it or still runs the last one."""
-        caller = self._caller
-        cause = output.find_output_cause(caller.status, now_ms - caller.status_ms, self._settings.lease_ms)
-        return self._tracker.applied(decided, cause, now_ms)
+        return self._tracker.applied(decided, self._cause(now_ms), now_ms)
 
     def state(self, cause: m.ZeroCause, now_us: int, now_ms: float) -> m.ThrustersState:
         """The line, what was sent, and what the microcontroller says."""
@@ -70,15 +69,28 @@ class EscOutput:
                 return
             self._configured_session = session
         decided = decide()
+        if self._cause(stopwatch_ms()) is m.ZeroCause.LINE_LOST:
+            decided = output.zero(decided, m.ZeroCause.LINE_LOST)
         call = output.thrust_call(decided, adapter.is_armed, self._numbers.advance(), self._settings.lease_ms)
         self._sent = Sent(call.armed, call.left, call.right, call.session)
-        status = await self._caller.call("paani_thrust", call.encode())
+        self._tracker.send(decided, stopwatch_ms())
+        try:
+            status = await self._caller.call("paani_thrust", call.encode())
+        except CallError:
+            self._tracker.send(decided, stopwatch_ms())
+            raise
         if status.verdict is m.McuVerdict.ACCEPTED:
             self._tracker.accept(decided, stopwatch_ms())
             return
+        self._tracker.refuse()
         self._count_drop(f"refused_{status.verdict}")
         if status.verdict is m.McuVerdict.NOT_CONFIGURED:
             self._configured_session = 0
+
+    def _cause(self, now_ms: float) -> m.ZeroCause:
+        """Why the microcontroller gives no thrust, as far as is known now."""
+        caller = self._caller
+        return output.find_output_cause(caller.status, now_ms - caller.status_ms, self._settings.lease_ms)
 
     def _observe(self, status: McuStatus) -> None:
         if self._numbers.observe(status):

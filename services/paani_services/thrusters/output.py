@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from paani import messages as m
 from paani.config import ThrustersConfig
 from paani.microcontroller.payloads import EscSettings, McuStatus, ThrustCall
@@ -88,31 +90,46 @@ class ReportSchedule:
         return max(0.0, self._due_ms - now_ms) * 1e-3
 
 
+class _Sent(NamedTuple):
+    decided: AppliedThrust
+    at_ms: float
+
+
 class OutputTracker:
     """What the thrusters do, as far as it is known: the newest decision that was answered, until its lease is over.
 
-    A zero that the microcontroller has not confirmed is not applied yet; it is once the last lease has run out.
+    A zero that the microcontroller has not confirmed is not applied yet; it is once the last lease has run out, that of
+    a frame without an answer included, which may have arrived.
     """
 
     def __init__(self, lease_ms: float) -> None:
         self._lease_ms = lease_ms
-        self._accepted: AppliedThrust | None = None
-        self._accepted_ms = 0.0
+        self._accepted: _Sent | None = None
+        self._unanswered: _Sent | None = None
 
-    def accept(self, applied: AppliedThrust, now_ms: float) -> None:
+    def send(self, decided: AppliedThrust, now_ms: float) -> None:
+        """The frame of this decision is on its way; once more, that it had no answer until now."""
+        if decided.zero_cause is m.ZeroCause.NONE:
+            self._unanswered = _Sent(decided, now_ms)
+
+    def accept(self, decided: AppliedThrust, now_ms: float) -> None:
         """The microcontroller has accepted the frame of this decision."""
-        self._accepted, self._accepted_ms = applied, now_ms
+        self._accepted, self._unanswered = _Sent(decided, now_ms), None
+
+    def refuse(self) -> None:
+        """The microcontroller has refused the newest frame: what it accepted before runs on."""
+        self._unanswered = None
 
     def applied(self, decided: AppliedThrust, output_cause: m.ZeroCause, now_ms: float) -> AppliedThrust:
-        """What is applied now: the decision, unless the microcontroller withholds it or still runs the last one."""
+        """What is applied now: the decision, unless the microcontroller withholds it or still runs an earlier one."""
         if output_cause not in {m.ZeroCause.NONE, m.ZeroCause.LINE_LOST, m.ZeroCause.REFUSED}:
             return zero(decided, output_cause)
-        last = self._accepted
-        is_live = last is not None and now_ms - self._accepted_ms <= self._lease_ms
-        if last is not None and is_live and last.zero_cause is m.ZeroCause.NONE:
-            return last
-        not_accepted = m.ZeroCause.LINE_LOST if output_cause is m.ZeroCause.NONE else output_cause
-        return zero(decided, not_accepted) if decided.zero_cause is m.ZeroCause.NONE else decided
+        is_zero = decided.zero_cause is not m.ZeroCause.NONE
+        for sent in (self._unanswered, self._accepted) if is_zero else (self._accepted,):
+            is_live = sent is not None and now_ms - sent.at_ms <= self._lease_ms
+            if sent is not None and is_live and sent.decided.zero_cause is m.ZeroCause.NONE:
+                return sent.decided
+        return zero(decided, m.ZeroCause.LINE_LOST if output_cause is m.ZeroCause.NONE else output_cause)
 
 
 def zero(decided: AppliedThrust, cause: m.ZeroCause) -> AppliedThrust:

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import common
 
 from paani.errors import UserError
+from paani.runtime import write_private
 from paani_services.mavlink import signing
 from paani_services.mavlink.codec import Codec
 from paani_services.mavlink.signing import (
@@ -19,7 +20,6 @@ from paani_services.mavlink.signing import (
     Signer,
     read_signing_key,
     read_stamp,
-    save_stamp,
     save_stamps,
     stamp_of,
 )
@@ -126,9 +126,27 @@ def test_a_file_that_holds_no_stamp_is_refused(content: bytes, tmp_path: Path) -
         read_stamp(file)
 
 
-def test_a_stamp_that_cannot_be_saved_is_told(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    save_stamp(tmp_path / "absent" / "stamp", 1)
-    assert "No such file" in caplog.text
+async def test_a_stamp_that_cannot_be_saved_is_told_once_and_tried_again(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(signing, "SAVE_PERIOD_S", 0.0)
+    file, tries = tmp_path / "later" / "stamp", 0
+
+    def write(path: Path, text: str) -> None:
+        nonlocal tries
+        tries += 1
+        write_private(path, text)
+
+    monkeypatch.setattr(signing, "write_private", write)
+    saving = asyncio.create_task(save_stamps(file, Signer(KEY, NOW_US)))
+    async with asyncio.timeout(10.0):
+        while tries < 4:
+            await asyncio.sleep(0)
+        file.parent.mkdir()
+        while not file.exists():
+            await asyncio.sleep(0)
+    saving.cancel()
+    assert caplog.text.count("No such file") == 1
 
 
 @pytest.mark.parametrize("frame", [signed(b"x" * 32, LATER), Peer.pack(None, DISARM)])  # type: ignore[arg-type]

@@ -96,6 +96,23 @@ def test_a_zero_is_applied_when_it_was_answered_or_the_lease_is_over() -> None:
     assert output.applied(DISARMED, m.ZeroCause.NONE, 1101.0) == DISARMED
 
 
+def test_a_frame_without_an_answer_may_have_arrived() -> None:
+    """A zero is not confirmed before its lease is over as well, or a later frame was answered."""
+    output = OutputTracker(LEASE_MS)
+    output.accept(AHEAD, 0.0)
+    output.send(AHEAD, 290.0)
+    output.send(DISARMED, 400.0)
+    assert output.applied(DISARMED, m.ZeroCause.NONE, 290.0 + LEASE_MS) == AHEAD
+    assert output.applied(DISARMED, m.ZeroCause.LINE_LOST, 291.0 + LEASE_MS) == DISARMED
+    assert output.applied(AHEAD, m.ZeroCause.LINE_LOST, 301.0).zero_cause is m.ZeroCause.LINE_LOST
+    output.send(AHEAD, 700.0)
+    output.refuse()
+    assert output.applied(DISARMED, m.ZeroCause.REFUSED, 701.0) == DISARMED
+    output.send(AHEAD, 800.0)
+    output.accept(DISARMED, 810.0)
+    assert output.applied(DISARMED, m.ZeroCause.NONE, 811.0) == DISARMED
+
+
 def test_reports_come_at_their_rate_and_where_the_cause_of_a_zero_changes() -> None:
     schedule = ReportSchedule(50.0, 0.0)
     assert schedule.advance(m.ZeroCause.NO_COMMAND, 0.0) == (True, False)
