@@ -11,7 +11,7 @@ STATUS_PATH = "/api/status"
 
 
 class ProcessStatus(msgspec.Struct, frozen=True, kw_only=True):
-    """One process. `starts`: how often the dashboard saw it come to life; the rest is of its newest health report."""
+    """One process. `starts`: how many starts of it the dashboard has seen; the rest is of its newest health report."""
 
     service: Text
     alive: bool

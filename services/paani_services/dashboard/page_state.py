@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import msgspec
+from msgspec.structs import replace
 
 from paani import keys
 from paani.config import Config, CorridorConfig, RiskConfig
@@ -53,7 +54,7 @@ class ServiceLife(msgspec.Struct, frozen=True):
 
 
 class PageServices(msgspec.Struct, frozen=True):
-    """Which services are alive; every start after the first is a restart."""
+    """Which services are alive, and how often each was seen to start; every start after the first is a restart."""
 
     services: tuple[ServiceLife, ...]
 
@@ -84,13 +85,30 @@ def page_settings(config: Config) -> PageSettings:
 
 
 class ServiceLiveness:
-    """Counts the starts of each service from its liveliness events."""
+    """Which services are there, by their liveliness, and their starts, by the epoch of what they report.
+
+    A router that was lost takes every liveliness token with it; the epoch stays with the process, and becomes a lower
+    one only where the clock was set back.
+    """
 
     def __init__(self) -> None:
         self._lives = {name: ServiceLife(name, alive=False, starts=0) for name in keys.SERVICES}
+        self._epochs: dict[str, int] = {}
 
     def update(self, service: str, alive: bool) -> PageServices:
-        before = self._lives.get(service, ServiceLife(service, alive=False, starts=0))
-        starts = before.starts + (alive and not before.alive)
-        self._lives[service] = ServiceLife(service, alive, starts)
+        """The services after a liveliness event."""
+        return self._put(ServiceLife(service, alive, self._life(service).starts))
+
+    def report(self, service: str, epoch: int) -> PageServices | None:
+        """The services after a health report of this epoch, where that tells of a start."""
+        is_start = epoch > self._epochs.get(service, -1)
+        self._epochs[service] = epoch
+        life = self._life(service)
+        return self._put(replace(life, starts=life.starts + 1)) if is_start else None
+
+    def _life(self, service: str) -> ServiceLife:
+        return self._lives.get(service, ServiceLife(service, alive=False, starts=0))
+
+    def _put(self, life: ServiceLife) -> PageServices:
+        self._lives[life.service] = life
         return PageServices(tuple(self._lives.values()))

@@ -42,6 +42,7 @@ async def serve_page(bus: Bus, tuner: Tuner, clock: Clock, config: Config) -> As
     """Run the web server and the tasks that feed it while the context lasts."""
     hub, history = Hub(), History(config.services)
     hub.put("dashboard/settings", page_settings(config), clock.now_us(), clock.now_us())
+    liveness = ServiceLiveness()
     operator = OperatorClient(bus, clock)
     missions = MissionClient(bus, clock)
     async with web_server(hub, history, operator, missions, tuner, clock, config), asyncio.TaskGroup() as tasks:
@@ -55,8 +56,9 @@ async def serve_page(bus: Bus, tuner: Tuner, clock: Clock, config: Config) -> As
         feeds.append(forward(hub, keys.THRUST_APPLIED, bus.latest(keys.THRUST_APPLIED), clock, APPLIED_PERIOD_S))
         feeds.append(forward_operator(hub, operator.states, clock))
         feeds.append(forward_shadow(hub, tuner, bus.latest(keys.SHADOW), clock))
+        feeds += [forward_health(hub, liveness, bus, service, clock) for service in keys.services_in(bus.graph)]
         feeds += [tuner.relay_forever(client, bus.queue(row)) for client, row in keys.TUNING_PROPOSALS.items()]
-        feeds += [track_services(hub, bus, clock), keep_history(hub, history, clock)]
+        feeds += [track_services(hub, liveness, bus, clock), keep_history(hub, history, clock)]
         running = [tasks.create_task(feed) for feed in feeds]
         try:
             yield
@@ -84,13 +86,13 @@ async def web_server(
 
 
 def subscribe(bus: Bus) -> list[tuple[keys.Topic[Any], Latest[Any]]]:
-    """Subscribe to every JSON topic and health report, except the topics that answer the operator."""
+    """Subscribe to every JSON topic, except those that answer the operator."""
     answers = (keys.THRUST_APPLIED, keys.OPERATOR_STATE, keys.SHADOW)
-    topics: list[keys.Topic[Any]] = [
-        topic for topic in keys.topics_in(bus.graph) if topic.stance is not keys.Stance.PICTURE and topic not in answers
+    return [
+        (topic, bus.latest(topic))
+        for topic in keys.topics_in(bus.graph)
+        if topic.stance is not keys.Stance.PICTURE and topic not in answers
     ]
-    topics += [keys.health(service) for service in keys.services_in(bus.graph)]
-    return [(topic, bus.latest(topic)) for topic in topics]
 
 
 async def forward(hub: Hub, topic: keys.Topic[Any], inbox: Latest[Any], clock: Clock, period_s: float) -> None:
@@ -131,14 +133,26 @@ async def forward_shadow(hub: Hub, tuner: Tuner, inbox: Latest[m.Shadow], clock:
         await asyncio.sleep(STATE_PERIOD_S)
 
 
-async def track_services(hub: Hub, bus: Bus, clock: Clock) -> None:
+async def forward_health(hub: Hub, liveness: ServiceLiveness, bus: Bus, service: str, clock: Clock) -> None:
+    """Forward what a service reports of itself, and count its starts."""
+    topic = keys.health(service)
+    inbox = bus.latest(topic)
+    while True:
+        value = await inbox.next()
+        now_us = clock.now_us()
+        hub.put(topic.name, value, inbox.received_us, now_us)
+        if (services := liveness.report(service, value.epoch)) is not None:
+            hub.put("dashboard/services", services, now_us, now_us)
+        await asyncio.sleep(STATE_PERIOD_S)
+
+
+async def track_services(hub: Hub, liveness: ServiceLiveness, bus: Bus, clock: Clock) -> None:
     """Publish which services are alive, and a line of the log when that changes."""
-    liveness = ServiceLiveness()
     async for service, alive in bus.alive_events():
         now_us = clock.now_us()
         hub.put("dashboard/services", liveness.update(service, alive), now_us, now_us)
         if service != bus.user:
-            level, text = ("info", "is ready") if alive else ("warn", "has stopped")
+            level, text = ("info", "is ready") if alive else ("warn", "is gone")
             hub.publish_event(Event(now_us, level, f"{service} {text}"))
 
 

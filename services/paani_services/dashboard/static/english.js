@@ -365,7 +365,7 @@ export const TIME_TEXTS = {
 export const HEALTH_TEXTS = {
   title: PAGE_TEXTS.health, table: "Processes", hint: "Press a process for the last lines of its log.", logLabel: "Log of a process", again: "Read again",
   columns: ["Process", "State", "Rate", "p50", "p95", "Age", "CPU", "MiB", "Files", "°C", "Starts", "Dropped", "Says"],
-  recorded: "recorded", notPlayed: "not played", ready: "ready", silent: "no report", stopped: "stopped", notStarted: "not started", noDrops: "none",
+  recorded: "recorded", notPlayed: "not played", ready: "ready", silent: "no report", gone: "gone", notStarted: "not started", noDrops: "none",
   sum: (/** @type {number} */ ready, /** @type {number} */ all) => `${ready} of ${all}`,
   sumTitle: (/** @type {number} */ ready, /** @type {number} */ all, /** @type {string} */ cores) => `${ready} of ${all} ready, ${cores} cores`,
   log: "Log of", empty: "The log is empty.", cut: "Its last lines; those before are in the file.",

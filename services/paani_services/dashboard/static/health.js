@@ -50,7 +50,7 @@ function readProcess({ store, now, isOpen }, name, input) {
   return {
     name, isReady, cpuCores: isReady ? report.cpu_cores : 0,
     cells: [
-      isRecorded ? [isFresh ? HEALTH_TEXTS.recorded : HEALTH_TEXTS.notPlayed, "quiet"] : isReady ? [HEALTH_TEXTS.ready, "good"] : life?.alive && isOpen ? [HEALTH_TEXTS.silent, "bad"] : life?.starts ? [HEALTH_TEXTS.stopped, "bad"] : [HEALTH_TEXTS.notStarted, "warn"],
+      isRecorded ? [isFresh ? HEALTH_TEXTS.recorded : HEALTH_TEXTS.notPlayed, "quiet"] : isReady ? [HEALTH_TEXTS.ready, "good"] : life?.alive && isOpen ? [HEALTH_TEXTS.silent, "bad"] : life?.starts ? [HEALTH_TEXTS.gone, "bad"] : [HEALTH_TEXTS.notStarted, "warn"],
       [input && (isReady || (isRecorded && isFresh)) ? `${fixed(input.rate_hz, input.rate_hz < 10 ? 1 : 0)} Hz` : "–", `${isReady && input && !input.rate_ok ? "warn number" : "number"}${stale}`],
       [delayText(delays, 0.5), "number"],
       [delayText(delays, 0.95), "number"],

@@ -71,10 +71,14 @@ async def test_a_picture_travels_as_its_bytes_with_its_header_beside() -> None:
     assert msgspec.json.decode(head.picture, type=m.PictureHeader) == header
 
 
-def test_restarts_are_counted() -> None:
+def test_a_start_is_a_newer_epoch_and_not_a_router_that_was_lost_or_a_clock_that_was_set_back() -> None:
     lives = ServiceLiveness()
-    known = [lives.update("eye", alive=alive) for alive in (True, True, False, True)][-1]
-    assert {life.service: life.starts for life in known.services}["eye"] == 2
+    for epoch, is_start in ((7000, True), (7000, False), (3000, False), (3000, False), (3200, True)):
+        for alive in (False, True):
+            lives.update("eye", alive=alive)
+        assert (lives.report("eye", epoch) is not None) == is_start
+    (eye,) = [life for life in lives.update("eye", alive=True).services if life.service == "eye"]
+    assert (eye.alive, eye.starts) == (True, 2)
 
 
 @pytest.mark.parametrize(

@@ -25,8 +25,9 @@ def test_the_status_is_the_newest_of_each_kind_with_its_age() -> None:
     hub.put(keys.EVIDENCE.name, EVIDENCE, 1_000_000, 1_000_000)
     hub.put(keys.ADVISORY.name, ADVISORY, 1_200_000, 1_200_000)
     hub.put(keys.PICTURE.name, PICTURE, 1_300_000, 1_300_000)
-    for alive in (True, False, True):
-        hub.put("dashboard/services", liveness.update("camera", alive), 0, 0)
+    for epoch in (1, 2):
+        liveness.report("camera", epoch)
+    hub.put("dashboard/services", liveness.update("camera", alive=True), 0, 0)
     drops = (m.DropCount(cause="old", count=2), m.DropCount(cause="future", count=3))
     health = m.Health(
         source_us=1, service="camera", ready=True, uptime_s=1.0, cpu_cores=0.25, rss_mib=30.0, drops=drops
