@@ -51,7 +51,7 @@ async def test_each_mode_is_ordered_on_the_page_and_the_advice_overridden_on_pur
             await until(page, f"document.querySelector('{button}').ariaPressed === 'true'")
             assert await page.locator("[data-drive][aria-pressed=true]").count() == 1
             await until(page, f"{WORD} === 'by the page, {mode.lower()}'")
-            await until(page, f"{LOG}.includes('{mode}: ordered by dashboard')")
+            await until(page, f"{LOG}.includes('{mode.capitalize()}: ordered by the page')")
         assert await button_text(page, DriveMode.RETURN) == "goes home or to a nearer rally point, keeps station there"
 
         assert not await page.is_visible("#drive-override")

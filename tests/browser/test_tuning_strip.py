@@ -55,7 +55,7 @@ async def test_the_strip_shows_parameters_in_force_and_on_trial(
         text = await page.inner_text("#tuning")
         assert "7f3a tried: policy.center_block_risk = 0.46" in text
         assert "3 of 120 frames differ (2.5 %), would move on 2 where it stops, stop on 1 where it moves" in text
-        assert "last: STOP (no safe side), tried: SLIGHT LEFT (centre edge incursion)" in text
+        assert "last: STOP (no safe side), tried: SLIGHT LEFT (something reaches into the centre)" in text
         assert await page.evaluate("document.querySelector('#tuning-counts').dataset.moves") == "true"
         assert await page.evaluate("document.documentElement.scrollWidth <= innerWidth")
         assert await page.evaluate("document.documentElement.scrollHeight <= innerHeight")

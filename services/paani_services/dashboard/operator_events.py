@@ -25,7 +25,7 @@ MODE_REFUSALS = {
     m.ModeRefusal.NOT_MANUAL: "the boat is not driven by hand",
 }
 
-
+REQUESTERS = {"dashboard": "the page", "stop": "paani stop", "button": "the button", "arm": "paani up"}
 OVERRIDE_ENDS = {
     m.OverrideEnd.NONE: "the operator's process does not say why",
     m.OverrideEnd.EXPIRED: "its time is over",
@@ -42,15 +42,20 @@ def describe_operator_change(before: m.OperatorState | None, now: m.OperatorStat
     return tuple(line for line in lines if line is not None)
 
 
+def name_requester(process: str) -> str:
+    """Who asks by that process, in words; a client that has none goes by its process's name."""
+    return REQUESTERS.get(process, process)
+
+
 def _describe_act(before: m.OperatorState | None, now: m.OperatorState, now_us: int) -> Event | None:
     """A line when the operator has stopped, armed, disarmed or ordered something else."""
     if before is None or before.epoch != now.epoch:
         return Event(now_us, "info", "the operator's process is here: not armed") if not now.armed else None
     if now.stops != before.stops:
         kept = "" if now.latch_kept else "; it could not be written to disk"
-        return Event(now_us, "stop", f"STOP requested by {now.by}{kept}")
+        return Event(now_us, "stop", f"STOP requested by {name_requester(now.by)}{kept}")
     if now.armed and not before.armed:
-        return Event(now_us, "warn", f"armed by {now.by}")
+        return Event(now_us, "warn", f"armed by {name_requester(now.by)}")
     if before.armed and not now.armed:
         return Event(now_us, "warn", "disarmed: the page's process has gone or begun again")
     return _describe_wheel_change(before, now, now_us)
@@ -67,13 +72,13 @@ def _describe_override_end(before: m.OperatorState | None, now: m.OperatorState,
 def _describe_wheel_change(before: m.OperatorState, now: m.OperatorState, now_us: int) -> Event | None:
     """A line for another mode, an override of the advice, or another hand at the wheel."""
     if now.override_ms > 0.0 and before.override_ms == 0.0:
-        return Event(now_us, "warn", f"{now.wheel_by} overrides the advice")
+        return Event(now_us, "warn", f"{name_requester(now.wheel_by)} overrides the advice")
     if (now.mode, now.mode_since_us) != (before.mode, before.mode_since_us):
         is_let_go = before.mode is m.DriveMode.MANUAL and now.mode is m.DriveMode.IDLE
-        why = "MANUAL has ended" if is_let_go else f"ordered by {now.wheel_by}"
-        return Event(now_us, "warn" if now.mode is m.DriveMode.MANUAL else "info", f"{now.mode}: {why}")
+        why = "driving by hand has ended" if is_let_go else f"ordered by {name_requester(now.wheel_by)}"
+        return Event(now_us, "warn" if now.mode is m.DriveMode.MANUAL else "info", f"{now.mode.capitalize()}: {why}")
     if now.mission_us != before.mission_us:
-        return Event(now_us, "info", f"another mission is in force, sent by {now.mission_answered_by}")
+        return Event(now_us, "info", f"another mission is in force, sent by {name_requester(now.mission_answered_by)}")
     if (now.wheel_by, now.wheel_hand) != (before.wheel_by, before.wheel_hand):
-        return Event(now_us, "info", f"the wheel is in another hand of {now.wheel_by}")
+        return Event(now_us, "info", f"the wheel is in another hand of {name_requester(now.wheel_by)}")
     return None

@@ -128,7 +128,7 @@ def _events(before: m.Message | None, now: m.Message, at_us: int) -> tuple[Event
     if isinstance(before, m.Advisory) and (before.direction, before.reason) == (now.direction, now.reason):
         return ()
     level = "stop" if now.direction in {m.Direction.STOP, m.Direction.NO_DATA} else "info"
-    return (Event(at_us, level, f"{now.direction.value}: {now.reason.value.lower()}".replace("_", " ")),)
+    return (Event(at_us, level, f"{now.direction.value.replace('_', ' ')}: {now.reason.value}"),)
 
 
 def main(arguments: list[str]) -> int:

@@ -25,7 +25,7 @@ export function describeActivity(store, now) {
   if (operator?.stopped && !isMoving) return activity("STOPPED", ACTIVITY_TEXTS.stoppedBy(operatorText(operator.by)));
   if (!store.isFresh("plant/thrust_applied", now)) return activity("UNKNOWN", STAGES.gate[1]);
   if (isMoving && command?.keeps_station) return activity("KEEPING_STATION", inhibits[0].text);
-  if (isMoving) return command?.enable ? describeMotion(store, command, now) : activity("UNDER_WAY", ACTIVITY_TEXTS.noOrder);
+  if (isMoving) return command?.enable ? describeMotion(store, command, now) : activity("UNORDERED", ACTIVITY_TEXTS.noOrder);
   if (inhibits.some(isOfArming)) return activity("NOT_ARMED", otherReason(inhibits));
   if (inhibits.some((reason) => reason.code === "IDLE")) return activity("IDLE", otherReason(inhibits.filter((reason) => reason.code !== "IDLE")));
   if (inhibits.some((reason) => reason.code === "NEUTRAL")) return activity("MANUAL", handReason(store, command, ACTIVITY_TEXTS.neutral));

@@ -19,7 +19,7 @@ export const PAGE_TEXTS = {
   override: "Override the advice for 10 s", mask: "Mask", boxes: "Boxes", corridors: "Corridors", top_edge: "Top edge", own_hull: "Own hull", opacity: "Opacity", water: "water",
   obstacle: "obstacle", sky: "sky", accepted: "accepted", not_seen_now: "not seen now", immediate_danger: "immediate danger", edit: "Edit", follow: "Follow", route: "Route",
   headings: "Headings", repeat: "repeat", laps: "laps", radius: "radius", metres: "m", for: "for", seconds: "s", speed_field: "speed", send: "Send", taken: "Taken", up: "Up:",
-  north: "North", route_line: "route", fence: "fence", land: "land", way_ahead: "way ahead", moving: "moving", estimated_track: "estimated track", true_track: "true track", plots: "Plots",
+  north: "North", route_line: "route", fence: "fence", land: "land", way_ahead: "way ahead", moving: "moving", estimated_track: "track", true_track: "true track", plots: "Plots",
   mode: "Mode", alerts_row: "Alerts", latency: "Latency", the_operator_key_which: "The operator's key, which", paani_up: "paani up", prints: "prints", log_in: "Log in",
   stops_the_boat_at_once: "Stops the boat at once, without login.",
 };
@@ -172,33 +172,26 @@ export const LOGIN_TEXTS = { noConnection: "No connection to the dashboard.", wr
 /** Reasons for zero thrust: inhibits of navigator and controller, and zero causes of the thrust adapter. @type {Record<string, string>} */
 export const STOP_REASONS = {
   NOT_ARMED: "not armed",
-  NO_CLOCK: "no time received from the boat",
-  CLOCK_STOPPED: "the boat's clock has stopped",
+  NO_CLOCK: "no time received from the boat", CLOCK_STOPPED: "the boat's clock has stopped",
   NO_ODOMETRY: "position unknown",
   STALE_ODOMETRY: "position too old",
   UNHEALTHY_ODOMETRY: "position estimate not healthy",
-  NO_ADVISORY: "no advice yet",
-  STALE_ADVISORY: "advice too old",
+  NO_ADVISORY: "no advice yet", STALE_ADVISORY: "advice too old",
   ADVISED_STOP: "the advisor advises STOP",
   ADVISED_NO_DATA: "the advisor has no evidence",
   TURN_CAPPED: "turned as far as allowed without finding a clear direction",
   NO_FREE_PATH: "no trajectory is known to be free",
   NO_ROUTE: "no route", MAP_MOVED: "the map begins elsewhere since localization began anew: start PAANI anew",
   ROUTE_FINISHED: "route finished",
-  HOLDING: "holding station",
-  MISSION_DONE: "mission done",
+  HOLDING: "holding station", MISSION_DONE: "mission done",
   OUTSIDE_FENCE: "outside the fence or on land, or too close to its edge",
-  NO_ORDER: "no mode received from the operator's process",
-  STALE_ORDER: "the operator's order is too old",
+  NO_ORDER: "no mode received from the operator's process", STALE_ORDER: "the operator's order is too old",
   IDLE: "idle: no mode that moves the boat is chosen",
   NEUTRAL: "the stick is in neutral",
   BLOCKED_AHEAD: "the advisor sees the way ahead blocked",
   WRONG_DOMAIN: "message from another domain",
-  NO_COMMAND: "no command yet",
-  STALE_COMMAND: "command too old",
-  COMMAND_INVALID: "command not valid",
-  no_command: "no thrust command yet",
-  timeout: "thrust commands stopped coming",
+  NO_COMMAND: "no command yet", STALE_COMMAND: "command too old", COMMAND_INVALID: "command not valid",
+  no_command: "no thrust command yet", timeout: "thrust commands stopped coming",
   not_enabled: "the command does not enable thrust",
   not_armed: "not armed",
   line_lost: "no answer from the microcontroller of the thrusters",
@@ -211,12 +204,18 @@ export const STOP_REASONS = {
   arming_lost: "no message from the operator's console",
   pulse_lost: "a vital process sends no heartbeat",
   stale_echo: "thrust command too old",
-  wrong_producer: "thrust command from another process",
-  wrong_domain: "thrust command from another domain",
-  old_epoch: "thrust command from an earlier run",
-  replayed: "thrust command repeated",
-  future: "thrust command from the future",
-  invalid: "thrust command out of range",
+  wrong_producer: "thrust command from another process", wrong_domain: "thrust command from another domain",
+  old_epoch: "thrust command from an earlier run", replayed: "thrust command repeated",
+  future: "thrust command from the future", invalid: "thrust command out of range",
+};
+
+/** Why a direction is advised. @type {Record<string, string>} */
+export const REASONS = {
+  CENTER_CLEAR: "centre clear", CENTER_RISK: "centre risk", CENTER_OCCUPIED: "centre occupied", CENTER_VESSEL: "vessel in the centre",
+  CENTER_EDGE_INCURSION: "something reaches into the centre", TURN_RETAINED: "turn kept a while", TIE_KEPT_SIDE: "sides alike, side kept",
+  TIE_STARBOARD: "sides alike, to starboard", NO_SAFE_SIDE: "no safe side", NO_SIDE_UNOCCUPIED: "both sides occupied",
+  NO_SIDE_FOR_LONG: "no side is clear for long", STALE_EVIDENCE: "evidence too old", FUTURE_EVIDENCE: "evidence of the future",
+  UNUSABLE_IMAGE: "picture unusable", MALFORMED_EVIDENCE: "evidence malformed", NO_EVIDENCE: "no evidence",
 };
 
 /** What the boat does: word and kind. `activity.js` says which holds. @type {Record<string, [string, string]>} */
@@ -232,7 +231,7 @@ export const ACTIVITIES = {
   ROUTE: ["FOLLOWING ROUTE", "go"],
   STATION: ["GOING TO STATION", "go"],
   HOME: ["RETURNING", "go"],
-  UNDER_WAY: ["UNDER WAY", "go"],
+  UNDER_WAY: ["UNDER WAY", "go"], UNORDERED: ["UNDER WAY", "turn"],
   MANUAL: ["DRIVEN BY HAND", "turn"],
   IDLE: ["IDLE", "none"],
   REPLAY: ["RECORDING", "none"],
@@ -364,7 +363,7 @@ export const TIME_TEXTS = {
 /** The health tab. */
 export const HEALTH_TEXTS = {
   title: PAGE_TEXTS.health, table: "Processes", hint: "Press a process for the last lines of its log.", logLabel: "Log of a process", again: "Read again",
-  columns: ["Process", "State", "Rate", "p50", "p95", "Age", "CPU", "MiB", "Files", "°C", "Starts", "Dropped", "Says"],
+  columns: ["Process", "State", "Rate", "Delay p50", "Delay p95", "Age", "CPU", "Memory [MiB]", "Files", "°C", "Starts", "Dropped", "Says"],
   recorded: "recorded", notPlayed: "not played", ready: "ready", silent: "no report", gone: "gone", notStarted: "not started", noDrops: "none",
   sum: (/** @type {number} */ ready, /** @type {number} */ all) => `${ready} of ${all}`,
   sumTitle: (/** @type {number} */ ready, /** @type {number} */ all, /** @type {string} */ cores) => `${ready} of ${all} ready, ${cores} cores`,
@@ -384,7 +383,7 @@ export const SETTING_TEXTS = {
 /** The recordings tab. */
 export const RECORDING_TEXTS = {
   title: PAGE_TEXTS.recordings, list: "List of recordings", again: "Read again", columns: ["File", "Began", "Duration", "Size", "State", "Do"],
-  off: "Nothing is recorded here: recorder.folder is not set (paani up --record DIR).",
+  off: "Nothing is recorded here. Who starts with paani up --record DIR finds the recordings in this list.",
   reading: "reading", in: "in", none: "nothing is recorded there yet", leftOut: "older ones are not listed", running: "being written", protected: "protected",
   play: "Replay here", download: "Download", protect: "Protect", unprotect: "Unprotect", delete: "Delete", sure: "Press again to delete",
 };

@@ -3,7 +3,7 @@
 
 import { processLog, showProcessLog } from "./process_log.js";
 import { cell, computed, html, mount, tableHead, tableMoment } from "./templates.js";
-import { HEALTH_TEXTS, ageText, fixed } from "./text.js";
+import { HEALTH_TEXTS, ageText, dropText, fixed, noteText } from "./text.js";
 
 /** The main output of each process; its rate is shown. @type {Record<string, string>} */
 const MAIN_TOPIC = {
@@ -60,8 +60,8 @@ function readProcess({ store, now, isOpen }, name, input) {
       [report?.open_files ? String(report.open_files) : "–", `number${stale}`],
       [report?.temperature_c ? fixed(report.temperature_c, 0) : "–", `number${stale}`],
       [life ? String(life.starts) : "–", life?.starts > 1 ? "warn number" : "number"],
-      [drops.length ? drops.map((/** @type {any} */ drop) => `${drop.cause} ${drop.count}`).join(", ") : report ? HEALTH_TEXTS.noDrops : "–", `${drops.length ? "warn wide" : "wide"}${stale}`],
-      [report?.note ?? "", "wide quiet"],
+      [drops.length ? drops.map(dropText).join(", ") : report ? HEALTH_TEXTS.noDrops : "–", `${drops.length ? "warn wide" : "wide"}${stale}`],
+      [noteText(report?.note ?? ""), "wide quiet"],
     ],
   };
 }

@@ -2,7 +2,7 @@
 // The log panel, newest line first: events of the dashboard, and each change of advice; repeats are counted.
 
 import { html, mount, signal } from "./templates.js";
-import { LOG_TEXTS, clockText, reasonText } from "./text.js";
+import { LOG_TEXTS, clockText, noteText, reasonText } from "./text.js";
 
 const MAX_LINES = 60;
 const REPEATED_WITHIN_US = 30e6, LOOK_BACK = 4; // a line that comes again so soon, among so many, is counted, not added
@@ -19,7 +19,7 @@ let lastAdvice = "", added = 0;
 export function bindLog() {
   mount(".log", () => html`<header><h2>${LOG_TEXTS.title}</h2></header>
     <ol id="log" tabindex="0" aria-label=${LOG_TEXTS.label} hidden=${past.value !== null}>${lines.value.map((line) => item(line, line.firstUs, line.key, line.count))}</ol>
-    <ol id="log-past" tabindex="0" aria-label=${LOG_TEXTS.past} hidden=${past.value === null}>${past.value?.slice(-MAX_LINES).reverse().map((event) => item(event, event.at_us))}</ol>`);
+    <ol id="log-past" tabindex="0" aria-label=${LOG_TEXTS.past} hidden=${past.value === null}>${past.value?.slice(-MAX_LINES).reverse().map((event) => item({ ...event, text: noteText(event.text) }, event.at_us))}</ol>`);
 }
 
 /** @param {Event} event @param {number} atUs @param {number} [key] @param {number} [count] */

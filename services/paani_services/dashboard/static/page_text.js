@@ -15,3 +15,4 @@ for (const element of /** @type {NodeListOf<HTMLElement | SVGElement>} */ (docum
     if (key) element.setAttribute(attribute, PAGE_TEXTS[key]);
   }
 }
+document.body.dataset.worded = "";

@@ -1,7 +1,7 @@
 // @ts-check
 // Texts and numbers as the page shows them; the words are those of english.js. Pure.
 
-import { NEVER, OPERATORS, TRACK_TEXTS } from "./english.js";
+import { NEVER, OPERATORS, REASONS, STOP_REASONS, TRACK_TEXTS } from "./english.js";
 
 export * from "./english.js";
 
@@ -12,7 +12,13 @@ export const words = (name) => name.toLowerCase().replaceAll("_", " ");
 export const sentence = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 
 /** A reason code as text. @param {string} reason */
-export const reasonText = (reason) => sentence(words(reason).replace(/^center/, "centre"));
+export const reasonText = (reason) => sentence(REASONS[reason] ?? words(reason));
+
+/** What a process says of itself, its codes in words. @param {string} note */
+export const noteText = (note) => note.replace(/\b[A-Z]+(_[A-Z]+)*\b/g, (code) => REASONS[code] ?? STOP_REASONS[code] ?? (code.includes("_") ? words(code) : code));
+
+/** What was dropped, and how much of it: a number, or a time where the cause names its unit. @param {{cause: string, count: number}} drop */
+export const dropText = ({ cause, count }) => (cause.endsWith("_ms") ? `${words(cause.slice(0, -3))} ${count} ms` : `${words(cause)} ${count}`);
 
 /** Tracks by number as on the picture, "person #3". @param {{id: number, label: string}[]} tracks @param {number[]} ids */
 export const trackNames = (tracks, ids) => ids.map((id) => `${tracks.find((track) => track.id === id)?.label ?? TRACK_TEXTS.unnamed} #${id}`).join(", ");

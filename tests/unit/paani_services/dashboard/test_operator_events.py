@@ -21,13 +21,13 @@ MANUAL = replace(ARMED, mode=m.DriveMode.MANUAL, mode_since_us=5)
 @pytest.mark.parametrize(
     ("before", "now", "level", "text"),
     [
-        (ARMED, MANUAL, "warn", "MANUAL: ordered by dashboard"),
-        (ARMED, replace(ARMED, mode=m.DriveMode.HOLD, mode_since_us=5), "info", "HOLD: ordered by dashboard"),
-        (MANUAL, replace(ARMED, mode=m.DriveMode.IDLE, mode_since_us=9), "info", "IDLE: MANUAL has ended"),
-        (MANUAL, replace(MANUAL, override_ms=9990.0), "warn", "dashboard overrides the advice"),
+        (ARMED, MANUAL, "warn", "Manual: ordered by the page"),
+        (ARMED, replace(ARMED, mode=m.DriveMode.HOLD, mode_since_us=5), "info", "Hold: ordered by the page"),
+        (MANUAL, replace(ARMED, mode=m.DriveMode.IDLE, mode_since_us=9), "info", "Idle: driving by hand has ended"),
+        (MANUAL, replace(MANUAL, override_ms=9990.0), "warn", "the page overrides the advice"),
         (ARMED, replace(ARMED, wheel_by="mavlink"), "info", "the wheel is in another hand of mavlink"),
-        (ARMED, replace(ARMED, wheel_hand=2), "info", "the wheel is in another hand of dashboard"),
-        (MANUAL, replace(ARMED, armed=False, stopped=True, stops=1), "stop", "STOP requested by dashboard"),
+        (ARMED, replace(ARMED, wheel_hand=2), "info", "the wheel is in another hand of the page"),
+        (MANUAL, replace(ARMED, armed=False, stopped=True, stops=1), "stop", "STOP requested by the page"),
     ],
 )
 def test_what_the_operator_orders_is_a_line_of_the_log(
@@ -50,7 +50,7 @@ def test_the_end_of_an_override_is_a_line_of_its_own_with_its_cause() -> None:
         assert (event.level, event.text) == ("warn", begins_with + why)
     stopped = replace(ARMED, armed=False, stopped=True, stops=1, override_end=m.OverrideEnd.DISARMED)
     assert [event.text for event in describe_operator_change(going, stopped, 7)] == [
-        "STOP requested by dashboard",
+        "STOP requested by the page",
         f"{begins_with}the boat is no longer armed",
     ]
     begun_again = replace(ARMED, armed=False, epoch=9)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from html.parser import HTMLParser
 
 import pytest
 
+from paani import messages as m
 from tests.places import ROOT
 
 STATIC = ROOT / "services" / "paani_services" / "dashboard" / "static"
@@ -73,6 +75,17 @@ def test_each_word_that_a_page_names_is_there_and_none_is_left_over() -> None:
     assert block is not None
     there = re.findall(r'(\w+): "(?:[^"\\]|\\.)*",', block[1])
     assert sorted(there) == sorted(set().union(*(words_of(page).names for page in PAGES)))
+
+
+@pytest.mark.parametrize(
+    ("table", "codes"),
+    [("REASONS", m.Reason), ("STOP_REASONS", m.Inhibit), ("STOP_REASONS", set(m.ZeroCause) - {"none"})],
+)
+def test_every_code_that_people_read_has_words(table: str, codes: Iterable[str]) -> None:
+    block = re.search(rf"export const {table} = {{\n(.*?)\n}};", ENGLISH, re.DOTALL)
+    assert block is not None
+    there = set(re.findall(r'(\w+): "', block[1]))
+    assert set(codes) - there == set()
 
 
 def test_no_other_script_has_a_sentence_and_no_template_a_word() -> None:

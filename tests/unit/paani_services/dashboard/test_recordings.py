@@ -107,8 +107,8 @@ def test_the_series_of_a_recording(tmp_path: Path) -> None:
     assert columns["mode"][1:3] == ("STOPPED", ""), "stale a second later"
     assert [(event.level, event.text) for event in series.events] == [
         ("info", "the operator's process is here: not armed"),
-        ("info", "LEFT: center risk"),
-        ("stop", "STOP requested by stop"),
+        ("info", "LEFT: CENTER_RISK"),
+        ("stop", "STOP requested by paani stop"),
     ]
 
 
