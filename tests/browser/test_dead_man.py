@@ -113,18 +113,20 @@ async def test_a_hand_that_is_gone_is_zero_thrust(browser: Any, open_as: OpenAs,
     async with at_work(lookout.advise_forever(), lookout.keep_reports()), contextlib.AsyncExitStack() as stack:
         services = (*SERVICES, keys.STATION)
         await asyncio.gather(*(stack.enter_async_context(spawn(service, *SETS)) for service in services))
-        for end in (release, blur, hide, close, cut):
+        for ends in ((release, blur, hide, close), (cut,)):
             async with Link(config.dashboard.port).open() as link:
-                await hold_until(end, lookout, browser, link, config)
+                page = (await watch(browser, replace(config, dashboard=replace(config.dashboard, port=link.port)))).page
+                await until(page, f"{TAKE} || {HOLD}")
+                if await page.evaluate(TAKE):  # the wheel is that of the page before
+                    await page.click("#drive-take")
+                await until(page, HOLD)  # the position is known
+                for end in ends:
+                    await hold_until(end, lookout, page, link, config)
+                await page.close()
 
 
-async def hold_until(end: End, lookout: Lookout, browser: Any, link: Link, config: Config) -> None:
-    """Drive by hand on a page of its own, armed anew, until this ends it."""
-    page = (await watch(browser, replace(config, dashboard=replace(config.dashboard, port=link.port)))).page
-    await until(page, f"{TAKE} || {HOLD}")
-    if await page.evaluate(TAKE):  # the wheel is that of the hand before
-        await page.click("#drive-take")
-    await until(page, HOLD)  # the position is known
+async def hold_until(end: End, lookout: Lookout, page: Any, link: Link, config: Config) -> None:
+    """Drive by hand, armed anew, until this ends it; what the end has left of the hand is then put right."""
     await arm_on_page(f"http://127.0.0.1:{config.dashboard.port}", config.bus)
     await page.wait_for_selector(f"{MANUAL}:enabled", timeout=WAIT_S * 1e3)
     await page.click(MANUAL)
@@ -144,7 +146,9 @@ async def hold_until(end: End, lookout: Lookout, browser: Any, link: Link, confi
     first_zero_us = next(report.sent_us for report in after if is_zero(report))
     assert (first_zero_us - gone_us) * 1e-6 <= LET_GO_S, end.__name__
     assert all(is_zero(report) for report in after if report.sent_us >= first_zero_us), f"and stays so: {end.__name__}"
-    await page.close()
+    if end in {blur, hide}:
+        await page.keyboard.up("w")
+        await page.evaluate(HIDE, False)
 
 
 def is_zero(report: m.ThrustApplied) -> bool:

@@ -62,7 +62,7 @@ async def test_each_mode_is_ordered_on_the_page_and_the_advice_overridden_on_pur
         await orders.until(lambda found: found.is_overridden)
         await until(page, f"{OVERRIDE}.startsWith('Advice overridden, ')")
         assert await page.get_attribute("#drive-override", "data-on") == "true"
-        await until(page, f"{LOG}.includes('dashboard overrides the advice')")
+        await until(page, f"{LOG}.includes('the page overrides the advice')")
         await orders.until(lambda found: not found.is_overridden)
         await until(page, f"{OVERRIDE} === 'Override the advice for 10 s'")
         assert orders.mode is DriveMode.MANUAL

@@ -282,25 +282,23 @@ async def test_a_phone_shows_everything_without_scrolling_sideways(
         await wait_for_arming(boat, armed=False, stopped=True)
 
 
-async def test_the_choice_of_frame(browser: Any, boat: Boat, spawn: Spawn, config: Config) -> None:
+async def test_the_choice_of_frame(scripts_page: Any) -> None:
     """The pure chooser, in the engine that runs it."""
-    async with spawn("dashboard"):
-        page = (await watch(browser, config)).page
-        choose = """async ([pictures, evidence, masks]) => {
-          const { chooseFrame } = await import("/static/frame_matching.js");
-          const c = chooseFrame(pictures, (id) => evidence.includes(id), (id) => masks.includes(id));
-          return [c.id, c.evidence, c.mask];
-        }"""
-        cases: list[tuple[list[str], list[str], list[str], list[object]]] = [
-            ([], [], [], [None, False, False]),
-            (["3", "2", "1"], [], ["3"], ["3", False, False]),
-            (["3", "2", "1"], ["2", "1"], ["2", "1"], ["2", True, True]),
-            (["3", "2", "1"], ["3", "2"], ["2"], ["2", True, True]),
-            (["4", "3", "2"], ["4", "3", "2"], ["2"], ["4", True, False]),
-            (["3"], ["9"], ["9"], ["3", False, False]),
-        ]
-        for pictures, evidence, masks, expected in cases:
-            assert await page.evaluate(choose, [pictures, evidence, masks]) == expected
+    choose = """async ([pictures, evidence, masks]) => {
+      const { chooseFrame } = await import("/static/frame_matching.js");
+      const c = chooseFrame(pictures, (id) => evidence.includes(id), (id) => masks.includes(id));
+      return [c.id, c.evidence, c.mask];
+    }"""
+    cases: list[tuple[list[str], list[str], list[str], list[object]]] = [
+        ([], [], [], [None, False, False]),
+        (["3", "2", "1"], [], ["3"], ["3", False, False]),
+        (["3", "2", "1"], ["2", "1"], ["2", "1"], ["2", True, True]),
+        (["3", "2", "1"], ["3", "2"], ["2"], ["2", True, True]),
+        (["4", "3", "2"], ["4", "3", "2"], ["2"], ["4", True, False]),
+        (["3"], ["9"], ["9"], ["3", False, False]),
+    ]
+    for pictures, evidence, masks, expected in cases:
+        assert await scripts_page.evaluate(choose, [pictures, evidence, masks]) == expected
 
 
 async def hold_to_arm(page: Any, held_s: float = 1.3) -> None:
