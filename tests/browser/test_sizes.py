@@ -87,7 +87,7 @@ async def test_no_tab_scrolls_sideways_on_a_phone(
         for tab in tabs:
             await show(page, tab)
             if tab == "health":
-                await until(page, "document.querySelector('#health').textContent.includes('thrust_stale_echo 31234')")
+                await until(page, "document.querySelector('#health').textContent.includes('thrust stale echo 31234')")
                 await page.click("#health button:text-is('dashboard')")
             if tab == "topics":
                 await page.click("#topics button:text-is('advisor/advisory')")

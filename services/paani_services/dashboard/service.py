@@ -16,15 +16,15 @@ from paani.mission_client import MissionClient
 from paani.operator_client import OperatorClient
 from paani_services.dashboard.gatekeeper import open_gate
 from paani_services.dashboard.history import SAMPLE_KEY, History
-from paani_services.dashboard.hub import FRAME_KEYS, Event, Hub
+from paani_services.dashboard.hub import FRAME_KEYS, Hub
 from paani_services.dashboard.operator_events import describe_operator_change
 from paani_services.dashboard.page_state import ServiceLiveness, page_settings
 from paani_services.dashboard.pages import load_static_files
+from paani_services.dashboard.process_lives import STATE_PERIOD_S, forward_health, track_services
 from paani_services.dashboard.server import Server, serving
 from paani_services.dashboard.time_series import SAMPLE_PERIOD_US
 from paani_services.dashboard.tuning import Tuner
 
-STATE_PERIOD_S = 0.1  # people read numbers no faster
 APPLIED_PERIOD_S = 0.5 / keys.THRUST_APPLIED.rate_hz  # every report: a zero is seen at once
 
 
@@ -131,29 +131,6 @@ async def forward_shadow(hub: Hub, tuner: Tuner, inbox: Latest[m.Shadow], clock:
             hub.publish_event(event)
         hub.put(keys.SHADOW.name, value, inbox.received_us, clock.now_us())
         await asyncio.sleep(STATE_PERIOD_S)
-
-
-async def forward_health(hub: Hub, liveness: ServiceLiveness, bus: Bus, service: str, clock: Clock) -> None:
-    """Forward what a service reports of itself, and count its starts."""
-    topic = keys.health(service)
-    inbox = bus.latest(topic)
-    while True:
-        value = await inbox.next()
-        now_us = clock.now_us()
-        hub.put(topic.name, value, inbox.received_us, now_us)
-        if (services := liveness.report(service, value.epoch)) is not None:
-            hub.put("dashboard/services", services, now_us, now_us)
-        await asyncio.sleep(STATE_PERIOD_S)
-
-
-async def track_services(hub: Hub, liveness: ServiceLiveness, bus: Bus, clock: Clock) -> None:
-    """Publish which services are alive, and a line of the log when that changes."""
-    async for service, alive in bus.alive_events():
-        now_us = clock.now_us()
-        hub.put("dashboard/services", liveness.update(service, alive), now_us, now_us)
-        if service != bus.user:
-            level, text = ("info", "is ready") if alive else ("warn", "is gone")
-            hub.publish_event(Event(now_us, level, f"{service} {text}"))
 
 
 async def keep_history(hub: Hub, history: History, clock: Clock) -> None:
