@@ -32,12 +32,12 @@ def test_the_readme_states_the_newest_run_on_fresh_seeds() -> None:
     touched = sum(each.collisions > 0 for each in run)
     free, rate = wilson_interval(len(run) - touched, len(run)), [count / km for count in poisson_interval(contacts)]
     text = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
-    for said in (
+    for statement in (
         f"In {len(run)} simulated drives by camera, {km:.1f} km on seeds that the commit under test drew",
         f"{sum(each.why == 'completed' for each in run)} were completed and {WORDS[touched]} touched something",
         f"without contact {100 * (1 - touched / len(run)):.0f} % [{100 * free[0]:.1f}, {100 * free[1]:.1f}]",
         f"{contacts / km:.1f} contacts a kilometre [{rate[0]:.1f}, {rate[1]:.1f}]",
         f"of {sum(each.encounters for each in run)} encounters",
     ):
-        assert said in text
+        assert statement in text
     assert ("both out of sight" in text) == (sum(each.collisions_visible for each in run) == 0)

@@ -80,15 +80,15 @@ async def save_stamps(file: Path, signer: Signer) -> None:
 
     Where that fails, which is told once, the next run knows this one by the clock alone.
     """
-    told = ""
+    last_problem = ""
     while True:
         try:
             await asyncio.to_thread(write_private, file, str(signer.newest))
         except OSError as error:
             problem = f"{file}: {error.strerror}; the clock alone tells the next start what was signed before"
-            if problem != told:
+            if problem != last_problem:
                 LOG.warning("%s", problem)
-            told = problem
+            last_problem = problem
         await asyncio.sleep(SAVE_PERIOD_S)
 
 
