@@ -5,23 +5,24 @@ from __future__ import annotations
 import io
 import stat
 import struct
+import zlib
 from collections.abc import Container, Iterator
 from pathlib import Path
 
+import lz4.frame
 import msgspec
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Chunk
-from mcap.stream_reader import get_chunk_data_stream
 
 from paani.errors import UserError
 
 MAGIC = bytes((137, 77, 67, 65, 80, 48, 13, 10))
 PROFILE = "paani"
 FORMAT = 1
-MAX_CHUNK_BYTES = 1 << 30
+MAX_CHUNK_BYTES = 64 << 20  # unpacked: the recorder's hold 256 KiB and one message, other writers' a few MiB
 DAMAGE = (McapError, zstandard.ZstdError, struct.error, ValueError, ArithmeticError, MemoryError, RuntimeError)
 
 _HEAD = struct.Struct("<BQ")
@@ -87,14 +88,30 @@ def span_bytes(path: Path, span: Span) -> tuple[bytes, str]:
 def unpacked_chunk(content: bytes, offset: int) -> tuple[bytes, str]:
     """The same of the content of a chunk record at a byte of its file."""
     try:
-        chunk = Chunk.read(ReadDataStream(io.BytesIO(content)))
-        if chunk.uncompressed_size > MAX_CHUNK_BYTES:
-            return b"", f"chunk at byte {offset} claims {chunk.uncompressed_size} bytes, left out"
-        stream, length = get_chunk_data_stream(chunk, validate_crc=True)
-        data: bytes = stream.read(length)
+        return unpacked_records(Chunk.read(ReadDataStream(io.BytesIO(content)))), ""
     except DAMAGE as error:
         return b"", f"chunk at byte {offset} is damaged, left out ({line_of(error)})"
-    return data, ""
+
+
+def unpacked_records(chunk: Chunk) -> bytes:
+    """The records in a chunk, never more than MAX_CHUNK_BYTES. Raises one of DAMAGE where it is not what it claims."""
+    size: int = chunk.uncompressed_size
+    if size > MAX_CHUNK_BYTES:
+        raise ValueError(f"a chunk of {size} bytes")
+    match chunk.compression:
+        case "":
+            data: bytes = chunk.data
+        case "zstd":
+            data = zstandard.ZstdDecompressor().stream_reader(chunk.data).read(size + 1)
+        case "lz4":
+            data = lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, size + 1)
+        case other:
+            raise ValueError(f"a compression '{other[:40]}'")
+    if len(data) != size:
+        raise ValueError("a chunk of another size than it claims")
+    if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
+        raise ValueError("a chunk fails its checksum")
+    return data
 
 
 def line_of(error: BaseException) -> str:

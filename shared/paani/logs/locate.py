@@ -74,7 +74,7 @@ def _read_summary(layout: Layout, data: mmap.mmap) -> bool:
     if footer.summary_crc and zlib.crc32(data[footer.summary_start : at + FOOTER_BYTES - 4]) != footer.summary_crc:
         raise ValueError("it fails its checksum")
     counts: dict[int, int] = {}
-    total, place = 0, footer.summary_start
+    total, place, pointed_bytes = 0, footer.summary_start, 0
     while place < at:
         record = _record_at(data, place)
         place = record.end
@@ -87,10 +87,15 @@ def _read_summary(layout: Layout, data: mmap.mmap) -> bool:
             case Opcode.CHUNK_INDEX:
                 index = ChunkIndex.read(_stream(content(data, record)))
                 chunk = _record_at(data, index.chunk_start_offset)
+                pointed_bytes += chunk.end - chunk.start
                 _learn_span(layout, chunk, index.message_start_time, index.message_end_time)
             case Opcode.ATTACHMENT_INDEX | Opcode.METADATA_INDEX:
                 offset = int.from_bytes(content(data, record)[:8], "little")
-                _learn(layout, data, _record_at(data, offset))
+                pointed = _record_at(data, offset)
+                pointed_bytes += pointed.end - pointed.start
+                _learn(layout, data, pointed)
+        if pointed_bytes > len(data):
+            raise ValueError("it points to the same bytes more than once")
     if total and not layout.spans:
         return False
     _learn(layout, data, _record_at(data, len(MAGIC)))

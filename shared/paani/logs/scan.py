@@ -12,14 +12,14 @@ from typing import NamedTuple
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, Header, Metadata, Schema
-from mcap.stream_reader import get_chunk_data_stream
 
-from paani.logs.layout import DAMAGE, MAGIC, MAX_CHUNK_BYTES, MESSAGE
+from paani.logs.layout import DAMAGE, MAGIC, MESSAGE, line_of, unpacked_records
 
 HEAD = struct.Struct("<BQ")
 # In a chunk: opcode and length, two times, size, checksum, then the name of the compression.
 ZSTD_MARK, MARK_AT = b"\x04\x00\x00\x00zstd", HEAD.size + 28
 OPCODES = frozenset(opcode.value for opcode in Opcode)
+MAX_TIMES_IN_VAIN = 16
 INSIDE_CHUNKS = frozenset({Opcode.SCHEMA.value, Opcode.CHANNEL.value, Opcode.MESSAGE.value})
 
 Data = bytes | mmap.mmap
@@ -44,9 +44,11 @@ class Damage(NamedTuple):
 def scan(data: Data) -> Iterator[ScannedRecord | Damage]:
     """Every record in order, of data and summary alike. What lies between two that can be read is damage.
 
-    A chunk or attachment can be read when its checksum is right. Nothing is raised, whatever the bytes.
+    A chunk or attachment can be read when its checksum is right. Nothing is raised, whatever the bytes. Work grows as
+    the file does: where more than MAX_TIMES_IN_VAIN times its bytes were read in vain, the rest is damage.
     """
     end = len(data)
+    in_vain = 0  # bytes of records that could not be read: those of a hostile file overlap
     at = len(MAGIC)
     if data[:at] != MAGIC:
         at = 0
@@ -58,7 +60,16 @@ def scan(data: Data) -> Iterator[ScannedRecord | Damage]:
             yield record
             at = record.end
             continue
-        resumed = _resume(data, at, record)
+        in_vain += _size_in(data, record)
+        resumed = end
+        for place in _places_to_resume(data, at, record):
+            if in_vain > MAX_TIMES_IN_VAIN * end:
+                break
+            tried, fault = _record(data, place)
+            if not fault:
+                resumed = place
+                break
+            in_vain += _size_in(data, tried)
         yield Damage(at, resumed, cause)
         at = resumed
 
@@ -70,9 +81,7 @@ def content(data: Data, record: ScannedRecord) -> bytes:
 
 def unpacked(data: Data, chunk: ScannedRecord) -> bytes:
     """The records in a chunk that `scan` has found."""
-    stream, length = get_chunk_data_stream(Chunk.read(stream_of(content(data, chunk))), validate_crc=False)
-    inside: bytes = stream.read(length)
-    return inside
+    return unpacked_records(Chunk.read(stream_of(content(data, chunk))))
 
 
 def records_in(inside: bytes) -> Iterator[ScannedRecord]:
@@ -110,11 +119,7 @@ def _fault(data: Data, record: ScannedRecord) -> str:
     try:
         match record.opcode:
             case Opcode.CHUNK:
-                chunk = Chunk.read(stream)
-                if chunk.uncompressed_size > MAX_CHUNK_BYTES:
-                    return f"a chunk of {chunk.uncompressed_size} bytes"
-                unpacked_stream, length = get_chunk_data_stream(chunk, validate_crc=True)
-                return _fault_inside(unpacked_stream.read(length))
+                return _fault_inside(unpacked_records(Chunk.read(stream)))
             case Opcode.ATTACHMENT:
                 Attachment.read(stream)
                 if any(inside[-4:]) and zlib.crc32(inside[:-4]) != int.from_bytes(inside[-4:], "little"):
@@ -132,24 +137,30 @@ def _fault(data: Data, record: ScannedRecord) -> str:
             case _:
                 return ""
     except DAMAGE as error:
-        return (str(error) or type(error).__name__).splitlines()[0][:80]
+        return line_of(error)
     return "" if record.opcode == Opcode.ATTACHMENT or stream.count == len(inside) else "a record of the wrong length"
 
 
 def _fault_inside(records: bytes) -> str:
     """What is wrong with the first record of a chunk that cannot be read: a chunk need not have a checksum."""
-    faults = (_fault(records, each) for each in records_in(records) if each.opcode in INSIDE_CHUNKS)
-    return next(filter(None, faults), "")
+    for each in records_in(records):
+        if each.opcode not in INSIDE_CHUNKS:
+            return f"a record of opcode {each.opcode} in a chunk"
+        if fault := _fault(records, each):
+            return fault
+    return ""
 
 
-def _resume(data: Data, at: int, damaged: ScannedRecord) -> int:
-    """Where reading can go on: after the damaged record, if its length is right, else at the next whole chunk."""
-    if at < damaged.end < len(data) and not _record(data, damaged.end)[1]:
-        return damaged.end
-    mark = at + MARK_AT + 1
-    while (mark := data.find(ZSTD_MARK, mark)) >= 0:
-        start = mark - MARK_AT
-        if data[start] == Opcode.CHUNK and not _record(data, start)[1]:
-            return start
-        mark += 1
-    return len(data)
+def _places_to_resume(data: Data, at: int, damaged: ScannedRecord) -> Iterator[int]:
+    """Where reading may go on: after the damaged record, if its length is right, else at a later chunk."""
+    if at < damaged.end < len(data):
+        yield damaged.end
+    mark = at + MARK_AT
+    while (mark := data.find(ZSTD_MARK, mark + 1)) >= 0:
+        if data[mark - MARK_AT] == Opcode.CHUNK:
+            yield mark - MARK_AT
+
+
+def _size_in(data: Data, record: ScannedRecord) -> int:
+    """Bytes that were read to find that a record is damaged; of one that ends outside none but its head were."""
+    return record.end - record.start if record.end <= len(data) else HEAD.size
