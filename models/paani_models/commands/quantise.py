@@ -11,6 +11,7 @@ from paani_models.catalogue import file_sha256, verified_path
 from paani_models.datasets.selection import PictureSelection
 from paani_models.datasets.sources import read_picture
 from paani_models.detector.exported import open_detector
+from paani_models.engines.contract_check import require_contract
 from paani_models.network_input import segmenter_input
 from paani_models.quantisation import acceptance
 from paani_models.quantisation.acceptance import QuantisationRecord
@@ -25,6 +26,7 @@ def run(arguments: argparse.Namespace, pictures: PictureSelection) -> int:
     """
     net, recipe = arguments.net, RECIPES[arguments.recipe][arguments.net]
     source = arguments.model or verified_path(net)
+    require_contract(source, net)
     is_segmenter = net == "segmenter"
     labelled = [s for s in pictures.samples if (s.mask if is_segmenter else s.label)]
     held_out = pictures.segmented_samples(held_out=True) if is_segmenter else pictures.boxed_samples(held_out=True)

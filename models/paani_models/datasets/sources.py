@@ -305,9 +305,10 @@ def is_held_out(source: Source, sequence: str) -> bool:
     return zlib.crc32(sequence.encode()) % source.one_in == 0
 
 
-def read_boxes(label: Path) -> NDArray[np.float32]:
+def read_boxes(label: Path, min_score: float | None = None) -> NDArray[np.float32]:
     """YOLO text -> float32 [n,5]: class, x1, y1, x2, y2 normalised and clipped to the picture.
 
+    min_score: each row ends with a score, and those below this are left out.
     Raises UserError where a row is malformed, a class unknown, or a box empty (R8).
     """
     rows = []
@@ -321,7 +322,10 @@ def read_boxes(label: Path) -> NDArray[np.float32]:
         known = kind in range(len(DETECTOR_CLASSES)) and np.isfinite((cx, cy, width, height)).all()
         if not known or not (x1 < x2 and y1 < y2):
             raise UserError(f"{place}: not a class id and a box inside the picture")
-        rows.append((kind, x1, y1, x2, y2))
+        if min_score is not None and len(numbers) < 6:
+            raise UserError(f"{place}: has no score after the box")
+        if min_score is None or numbers[5] >= min_score:
+            rows.append((kind, x1, y1, x2, y2))
     return np.array(rows, np.float32).reshape(-1, 5)
 
 

@@ -15,7 +15,6 @@ from tqdm import tqdm
 
 from paani.arrays import F32
 from paani.errors import UserError
-from paani_models.datasets.checked_files import read_label_rows
 from paani_models.datasets.sources import DETECTOR_CLASSES, Sample, Source, read_boxes, read_mask, read_picture
 from paani_models.network_input import PAD_GREY, letterbox_affine
 from paani_models.training.augment import GLARE_FRAC, Rng, add_glare, degrade_picture, jitter_colour
@@ -102,12 +101,7 @@ def _pseudo_persons(sample: Sample) -> NDArray[np.float32]:
     path = sample.label.parent.parent / "labels_pseudo_person" / sample.label.name
     if "person" in sample.source.annotated or not path.is_file():
         return np.zeros((0, 5), np.float32)
-    scores = []
-    for place, numbers in read_label_rows(path):
-        if len(numbers) < 6:
-            raise UserError(f"{place}: has no score after the box")
-        scores.append(numbers[5])
-    return read_boxes(path)[np.array(scores) >= PSEUDO_PERSON_MIN_SCORE]
+    return read_boxes(path, PSEUDO_PERSON_MIN_SCORE)
 
 
 def letterbox_example(item: BoxedPicture, target_wh: tuple[int, int]) -> TrainingExample:

@@ -18,6 +18,7 @@ from tqdm import tqdm
 
 from paani.arrays import F32
 from paani.errors import UserError
+from paani.undecodable import UNREADABLE
 from paani.whole_file import write_json
 from paani_models.datasets.sources import DETECTOR_CLASSES, LOOSE_SOURCES
 from paani_models.detector.data import BoxedPicture
@@ -83,7 +84,10 @@ def add_teachers_boxes(
     out; its pictures then say of nothing that it is absent. What was found for the same pictures is read from `cache`,
     else written there.
     """
-    stored = msgspec.json.decode(cache.read_bytes(), type=dict[str, _Rows]) if cache.is_file() else {}
+    try:
+        stored = msgspec.json.decode(cache.read_bytes(), type=dict[str, _Rows]) if cache.is_file() else {}
+    except UNREADABLE as error:
+        raise UserError(f"{cache}: {error}") from error
     keys = [_checksum(item) for item in pictures]
     missing = [i for i, key in enumerate(keys) if key not in stored and _asked(pictures[i])]
     for i in tqdm(missing, "teachers", unit="picture", mininterval=2.0):

@@ -10,7 +10,7 @@ import numpy as np
 
 from paani.arrays import F32, U8
 from paani_models.detector.metrics import Detections, decode_boxes
-from paani_models.engines.onnx_runner import open_session, run_network
+from paani_models.engines.onnx_runner import input_size_hw, open_session, run_network
 from paani_models.network_input import detector_input, letterbox_affine
 
 
@@ -34,7 +34,7 @@ class ExportedDetector:
 
 
 def open_detector(path: Path, threads: int = 2) -> ExportedDetector:
-    """Raises UserError naming a file that cannot be loaded."""
+    """Raises UserError naming a file that cannot be loaded or does not take a picture of fixed size."""
     session = open_session(path, threads)
-    height, width = session.get_inputs()[0].shape[2:]
-    return ExportedDetector(lambda x: run_network(session, x), (int(width), int(height)))
+    height, width = input_size_hw(session, path)
+    return ExportedDetector(lambda x: run_network(session, x), (width, height))

@@ -11,6 +11,8 @@ import torch
 from torch import Tensor, nn
 from tqdm import tqdm
 
+from paani.errors import UserError
+from paani.undecodable import UNREADABLE
 from paani_models.detector.data import BoxedPicture, TrainingExample
 from paani_models.detector.paper_data import Augmentation, augment_paper_example
 from paani_models.detector.paper_loss import task_aligned_loss
@@ -95,7 +97,10 @@ class Yolo11nTraining:
         """Finished epochs since the first of the best."""
         if self.state.epoch == 0:
             return 0
-        rows = [msgspec.json.decode(line, type=_Row) for line in self._records().read_bytes().splitlines()]
+        try:
+            rows = [msgspec.json.decode(line, type=_Row) for line in self._records().read_bytes().splitlines()]
+        except UNREADABLE as error:
+            raise UserError(f"{self._records()}: {error}") from error
         scores = {row.epoch: row.score for row in rows if row.epoch <= self.state.epoch}
         return self.state.epoch - max(scores, key=lambda epoch: (scores[epoch], -epoch))
 

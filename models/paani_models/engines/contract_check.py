@@ -81,6 +81,13 @@ def inspect_model(path: Path, role: str) -> list[Finding]:
     return [*findings, Finding("ok", f"one run takes {statistics.median(took_ms):.1f} ms on one thread here")]
 
 
+def require_contract(path: Path, role: str) -> None:
+    """Raises UserError naming a file that is no ONNX model, or whose input or output is not its contract's."""
+    for finding in _check_shapes(open_session(path, 1), read_contract(path, role), role):
+        if finding.level == "error":
+            raise UserError(f"{path}: {finding.text}")
+
+
 def _check_shapes(session: Session, contract: Model, role: str) -> Iterator[Finding]:
     for what, ends, wanted in (
         ("input", session.get_inputs(), contract.input),

@@ -13,6 +13,7 @@ _NODE, _OUTPUT = 1, 12  # of a graph
 _INPUT_NAME, _OUTPUT_NAME, _OP_TYPE, _ATTRIBUTE = 1, 2, 4, 5  # of a node
 _NAME, _TEXT = 1, 4  # of an attribute; a value begins with its name as well
 _FLOAT32 = b"\x12\x04\x0a\x02\x08\x01"  # a value's type: a tensor of float32, its shape for the reader to infer
+_MAX_VARINT_BITS = 70
 _VARINT, _EIGHT_BYTES, _LENGTH_FIRST, _FOUR_BYTES = 0, 1, 2, 5
 
 
@@ -87,7 +88,7 @@ def _read_fields(message: memoryview) -> Iterator[_Field]:
 def _read_varint(message: memoryview, at: int) -> tuple[int, int]:
     """A number in groups of seven bits, lowest first, and where it ends."""
     value = shift = 0
-    while at < len(message):
+    while at < len(message) and shift < _MAX_VARINT_BITS:
         value |= (message[at] & 0x7F) << shift
         shift, at = shift + 7, at + 1
         if message[at - 1] < 0x80:

@@ -37,6 +37,15 @@ def open_session(path: Path, threads: int = 2, *, optimised: bool = True) -> Ses
         raise UserError(f"{path}: not a readable ONNX file ({type(error).__name__})") from error
 
 
+def input_size_hw(session: Session, path: Path) -> tuple[int, int]:
+    """Height and width of the picture that a net takes. Raises UserError naming a file of any other input."""
+    found = [(tuple(each.shape), each.type) for each in session.get_inputs()]
+    match found:
+        case [((1, 3, int(height), int(width)), "tensor(float)")]:
+            return height, width
+    raise UserError(f"{path}: takes {str(found)[:80]}, not one float32 [1, 3, H, W]")
+
+
 def run_network(session: Session, x: F32 | NDArray[np.uint8]) -> F32:
     """The first output for one input."""
     return np.asarray(session.run(None, {session.get_inputs()[0].name: x})[0], np.float32)

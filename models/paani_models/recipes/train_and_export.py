@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from dataclasses import dataclass, replace
 from functools import partial
@@ -49,6 +50,8 @@ SHIPPED = [folder.resolve() for folder in (WEIGHTS, *OTHER_SETS.values())]
 PAPER_NETWORKS = ("paper-segmenter", "yolo11n")
 COMPARED_PICTURES = 8  # on which an exported network must agree with its checkpoint
 
+STAGE = re.compile(r"[0-9]{1,4}x[1-9][0-9]{0,3}x[1-9][0-9]{0,3}")
+
 IMAGENET_RECIPE = SegmenterRecipe(stages=(Stage(12, 128, 160), Stage(12, 256, 320)), peak_rate=1e-3)
 
 
@@ -90,10 +93,9 @@ def parse_stages(stages: tuple[str, ...]) -> tuple[Stage, ...]:
     """`4x128x160` -> Stage(4, 128, 160). Raises UserError where it is malformed or no multiple of 32."""
     parsed = []
     for text in stages:
-        fields = text.split("x")
-        if len(fields) != 3 or not all(field.isdigit() for field in fields):
+        if not STAGE.fullmatch(text):
             raise UserError(f"stage: {text!r} is not EPOCHSxHEIGHTxWIDTH")
-        stage = Stage(*(int(field) for field in fields))
+        stage = Stage(*map(int, text.split("x")))
         if stage.height_px % 32 or stage.width_px % 32:
             raise UserError(f"stage: {text!r}: height and width must be multiples of 32")
         parsed.append(stage)

@@ -89,13 +89,16 @@ def read_training_record(folder: Path) -> list[dict[str, float]]:
     path = next((folder / name for name in RECORDS if (folder / name).is_file()), None)
     if path is None:
         raise UserError(f"{folder}: holds neither {' nor '.join(RECORDS)}")
+    try:
+        lines_of_file = path.read_bytes().splitlines()
+    except OSError as error:
+        raise UserError(f"{path}: {error.strerror}") from error
     rows = []
-    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+    for number, line in enumerate(lines_of_file, 1):
         try:
-            row = msgspec.json.decode(line, type=dict[str, object])
-        except UNDECODABLE as error:
+            rows.append(_flatten_numbers(msgspec.json.decode(line, type=dict[str, object])))
+        except (*UNDECODABLE, OverflowError) as error:
             raise UserError(f"{path}:{number}: {error}") from error
-        rows.append(_flatten_numbers(row))
     return rows
 
 

@@ -10,7 +10,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Annotated, Any, Generic, TypeVar
 
 import cv2
 import msgspec
@@ -21,6 +21,8 @@ from paani.errors import UserError
 from paani.whole_file import replacement_file
 
 Batch = TypeVar("Batch")
+
+Side = Annotated[int, msgspec.Meta(ge=0, le=4096, multiple_of=32)]
 
 PRETRAINED_RATE_FACTOR = 0.3  # of the learning rate, for a part that starts from pretrained weights
 
@@ -108,6 +110,22 @@ def load_checkpoint(path: Path) -> dict[str, Any]:
     return state
 
 
+class TrainedWith(msgspec.Struct, frozen=True):
+    """What an export knows of the recipe in a checkpoint. Sides are those of a detector's input, 0 where unstated."""
+
+    seed: Annotated[int, msgspec.Meta(ge=0, le=2**63 - 1)]
+    height_px: Side = 0
+    width_px: Side = 0
+
+
+def read_recipe(checkpoint: Path) -> TrainedWith:
+    """Raises UserError naming a checkpoint without a recipe, or with one of other values than a training has."""
+    try:
+        return msgspec.convert(load_checkpoint(checkpoint).get("recipe"), TrainedWith)
+    except msgspec.ValidationError as error:
+        raise UserError(f"{checkpoint}: recipe: {error}") from error
+
+
 class TrainingState:
     """Everything of a run that a checkpoint keeps, so that a resumed run equals an uninterrupted one (S11).
 
@@ -191,7 +209,7 @@ class TrainingState:
         if not path.exists():
             return
         state = load_checkpoint(path)
-        if state["recipe"] != recipe:
+        if state.get("recipe") != recipe:
             raise UserError(f"{path}: was made with another recipe; choose another folder")
         self.model.load_state_dict(state["model"])
         self.average.model.load_state_dict(state["average"])
@@ -206,7 +224,7 @@ def load_averaged_weights(model: nn.Module, checkpoint: Path) -> None:
     """Fill a network with a checkpoint's averaged weights. Raises UserError naming a checkpoint that does not fit."""
     try:
         model.load_state_dict(load_checkpoint(checkpoint)["average"])
-    except (KeyError, RuntimeError) as error:
+    except (KeyError, RuntimeError, TypeError) as error:
         raise UserError(f"{checkpoint}: not a checkpoint of this net") from error
 
 

@@ -39,6 +39,15 @@ def test_boxes_are_corners_clipped_to_the_picture(tmp_path: Path) -> None:
     np.testing.assert_allclose(read_boxes(label), [[1, 0.4, 0.3, 0.6, 0.7], [3, 0, 0.4, 0.15, 0.6]], atol=1e-6)
 
 
+def test_boxes_below_a_score_are_left_out_and_each_needs_one(tmp_path: Path) -> None:
+    label = tmp_path / "a.txt"
+    label.write_text("1 0.5 0.5 0.2 0.4 0.49\n3 0.5 0.5 0.2 0.2 0.5\n")
+    np.testing.assert_allclose(read_boxes(label, 0.5), [[3, 0.4, 0.4, 0.6, 0.6]], atol=1e-6)
+    label.write_text("1 0.5 0.5 0.2 0.4 0.9\n3 0.5 0.5 0.2 0.2\n")
+    with pytest.raises(UserError, match=r"a\.txt:2: has no score after the box"):
+        read_boxes(label, 0.5)
+
+
 @pytest.mark.parametrize(
     "text", ["4 .5 .5 .1 .1", "1 .5 .5 0 .1", "1 .5 .5 .1", "1 .5 x .1 .1", "1 1.5 .5 .1 .1", "1 nan .5 .1 .1"]
 )

@@ -8,6 +8,8 @@ import cv2
 import numpy as np
 import pytest
 
+from paani.cli import main
+from paani.errors import UserError
 from paani_models.datasets.sources import SOURCES, Sample
 from paani_models.detector.exported import open_detector
 from paani_models.detector.scores import count_false_alarms, score_boxes
@@ -49,3 +51,25 @@ def test_a_vessel_where_none_is_counts(tmp_path: Path) -> None:
     river = next(s for s in SOURCES if "vessel" in s.empty_of)
     sample = Sample(river, "a", True, tmp_path / "a.png", None, None)
     assert count_false_alarms(answering(tmp_path, (416, 320)), [sample]) == [1]
+
+
+@pytest.mark.parametrize("side", ["height", "9" * 5000])
+def test_a_detector_without_a_fixed_size_of_input_is_refused_in_one_line(tmp_path: Path, side: str) -> None:
+    path = tmp_path / "any.onnx"
+    save(path, np.zeros((1, 8, 2), np.float32), [1, 3, side, 320])
+    with pytest.raises(UserError) as refused:
+        open_detector(path)
+    assert str(refused.value).startswith(f"{path}: takes ")
+    assert len(str(refused.value)) < len(str(path)) + 150
+
+
+@pytest.mark.parametrize("net", ["segmenter", "detector"])
+def test_a_network_of_another_contract_is_not_quantised(
+    tmp_path: Path, net: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("paani_models.commands.models._select_pictures", lambda _: None)  # refused before they matter
+    path, out = tmp_path / "other.onnx", tmp_path / "out"
+    save(path, np.zeros((1, 8, 2), np.float32), [1, 3, "height", 320])
+    assert main(["models", "quantise", net, "--model", str(path), "--out", str(out)]) == 2
+    assert capsys.readouterr().err.splitlines()[-1].startswith(f"paani models: {path}: input [1, 3, 'height', 320] is")
+    assert not out.exists()

@@ -13,6 +13,7 @@ from paani_models.recipes import onnx_export  # noqa: E402
 from paani_models.recipes.onnx_export import (  # noqa: E402
     CONTRACTS,
     build_network,
+    contract_of,
     export_untrained,
     largest_export_difference,
     write_onnx,
@@ -52,3 +53,25 @@ def test_t2_the_difference_is_the_largest_of_all_inputs_in_whatever_order(tmp_pa
     assert len(set(single)) == 3
     for order in (inputs, inputs[::-1]):
         assert largest_export_difference(other, tmp_path / "net.onnx", order) == max(single)
+
+
+@pytest.mark.parametrize(
+    ("state", "named"),
+    [
+        ({}, "recipe: Expected `object`, got `null`"),
+        ({"recipe": {}}, "recipe: Object missing required field `seed`"),
+        ({"recipe": {"seed": 10**600}}, "recipe: "),
+        ({"recipe": {"seed": 1, "height_px": 10**600}}, "recipe: "),
+        ({"recipe": {"seed": 1, "width_px": 100}}, "recipe: "),
+    ],
+    ids=["no recipe", "no seed", "a seed of 600 digits", "a height of 600 digits", "a width of no whole cells"],
+)
+def test_a_checkpoint_with_a_recipe_of_no_training_is_named_in_one_line(
+    tmp_path: Path, state: dict[str, object], named: str
+) -> None:
+    path = tmp_path / "last.pt"
+    torch.save(state, path)
+    with pytest.raises(UserError) as refused:
+        contract_of("detector", path)
+    assert str(refused.value).startswith(f"{path}: {named}")
+    assert len(str(refused.value).splitlines()) == 1

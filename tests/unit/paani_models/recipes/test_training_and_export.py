@@ -214,7 +214,7 @@ def test_a_detector_is_exported_for_the_size_that_it_was_trained_with(
 
 def test_a_size_is_height_times_width_in_whole_cells() -> None:
     assert parse_size("320x416") == (320, 416)
-    for wrong in ("320", "320x416x3", "300x400"):
+    for wrong in ("320", "320x416x3", "300x400", "²x32", "0x32", "9" * 5000 + "x32"):
         with pytest.raises(UserError, match="stage"):
             parse_size(wrong)
 
