@@ -9,6 +9,7 @@ from paani import portable
 # WGS 84 (NIMA TR8350.2, table 3.1): semi-major axis [m], first eccentricity squared.
 SEMI_MAJOR_M = 6_378_137.0
 ECCENTRICITY2 = 6.694379990141317e-3
+MAX_ORIGIN_LATITUDE_DEG = 85.0  # nearer to a pole a degree of longitude is too short for a plane
 
 
 def wrap_rad(angle: float) -> float:
@@ -43,9 +44,10 @@ def enu_from_geodetic(
 def geodetic_from_enu(
     x_m: float, y_m: float, origin_latitude_deg: float, origin_longitude_deg: float
 ) -> tuple[float, float]:
-    """Inverse of `enu_from_geodetic`: latitude and longitude [deg]."""
+    """Inverse of `enu_from_geodetic`: latitude, and longitude within 180 [deg]."""
     east_m_per_deg, north_m_per_deg = _metres_per_degree(origin_latitude_deg)
-    return origin_latitude_deg + y_m / north_m_per_deg, origin_longitude_deg + x_m / east_m_per_deg
+    longitude_deg = math.remainder(origin_longitude_deg + x_m / east_m_per_deg, 360.0)
+    return origin_latitude_deg + y_m / north_m_per_deg, longitude_deg
 
 
 def _metres_per_degree(latitude_deg: float) -> tuple[float, float]:

@@ -16,7 +16,7 @@ from msgspec.structs import replace
 from paani.config import load_config
 from paani.errors import UserError
 from paani.fence_geometry import FENCE_WORDS, LAND_WORDS, BorderWords, find_route_violation
-from paani.geometry import geodetic_from_enu
+from paani.geometry import MAX_ORIGIN_LATITUDE_DEG, geodetic_from_enu
 from paani.messages import FenceArea
 from paani.option_numbers import quantity
 from paani.option_paths import input_file, output_file
@@ -28,6 +28,7 @@ from paani_services.navigator.files.map_frame import LatLon
 from paani_services.navigator.files.route_file import (
     encode_route,
     in_own_metres,
+    lat_lon_of_points,
     load_route,
     points_m,
     read_route,
@@ -50,7 +51,7 @@ def _convert(options: argparse.Namespace) -> None:
     where = str(options.source)
     line = read_route(options.source, where)
     if options.origin is not None and line.origin_deg is None:
-        line = replace(line, origin_deg=options.origin)
+        line = _with_origin(line, options.origin, where)
     if options.thin is not None:
         line = _simplify_route(line, options.thin, where)
     if options.repeat:
@@ -59,6 +60,17 @@ def _convert(options: argparse.Namespace) -> None:
     data = encode_route(line, options.target.suffix, str(options.target))
     write_whole(options.target, data)
     sys.stdout.write(f"{options.target}: {len(line.points)} waypoints\n")
+
+
+def _with_origin(line: RouteLine, origin_deg: LatLon, where: str) -> RouteLine:
+    """Raises UserError naming the option where the route lies too far from it."""
+    line = replace(line, origin_deg=origin_deg)
+    try:
+        in_own_metres(line, where)
+        lat_lon_of_points(line, where)
+    except UserError as error:
+        raise UserError(f"--origin {_lat_lon(origin_deg)}: {error}") from error
+    return line
 
 
 def _simplify_route(line: RouteLine, tolerance_m: float, where: str) -> RouteLine:
@@ -130,9 +142,11 @@ def _lat_lon(lat_lon_deg: LatLon) -> str:
 def _origin(text: str) -> LatLon:
     with contextlib.suppress(ValueError):
         latitude_deg, longitude_deg = (float(part) for part in text.split(","))
-        if -90.0 <= latitude_deg <= 90.0 and -180.0 <= longitude_deg <= 180.0:
+        if abs(latitude_deg) <= MAX_ORIGIN_LATITUDE_DEG and -180.0 <= longitude_deg <= 180.0:
             return latitude_deg, longitude_deg
-    raise argparse.ArgumentTypeError(f"'{text}': expected LAT,LON in degrees, within 90 and 180")
+    raise argparse.ArgumentTypeError(
+        f"'{text}': expected LAT,LON in degrees, within {MAX_ORIGIN_LATITUDE_DEG:g} and 180"
+    )
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -11,9 +11,10 @@ import msgspec
 
 from paani.config.planner import Angle, PlannerConfig
 from paani.config.section import Fraction, NonNegative, Positive, Section
+from paani.geometry import MAX_ORIGIN_LATITUDE_DEG
 
 TotalTurn = Annotated[float, msgspec.Meta(gt=0.0, le=170.0)]  # degrees; half a turn could not be told from none
-Latitude = Annotated[float, msgspec.Meta(ge=-90.0, le=90.0)]
+OriginLatitude = Annotated[float, msgspec.Meta(ge=-MAX_ORIGIN_LATITUDE_DEG, le=MAX_ORIGIN_LATITUDE_DEG)]
 Longitude = Annotated[float, msgspec.Meta(ge=-180.0, le=180.0)]
 
 
@@ -26,7 +27,7 @@ class LocalizationConfig(Section, frozen=True):
     rate_hz: Positive = 20.0  # L1, L3: estimates at so many steps a second
     # `augmented` estimates the slow errors of receiver and compass and the drift too; `plain` is L3.
     ekf: Literal["augmented", "plain"] = "augmented"
-    origin_lat_lon_deg: tuple[Latitude, Longitude] | None = None
+    origin_lat_lon_deg: tuple[OriginLatitude, Longitude] | None = None
     gate_mahalanobis2: Positive = 25.0  # validation gate of a fix: 5 standard deviations
     gps_wander_s: Positive = 60.0  # time constant of the receiver's slow error; as `plant.sensors.gps_bias_time_s`
     calibration_s: NonNegative = 1.0  # at rest, over which the biases of the gyroscope are first averaged

@@ -12,12 +12,13 @@ import msgspec
 
 from paani.config.section import Section
 from paani.errors import UserError
-from paani.geometry import enu_from_geodetic, geodetic_from_enu
+from paani.geometry import MAX_ORIGIN_LATITUDE_DEG, enu_from_geodetic, geodetic_from_enu
 from paani.messages import Waypoint
 from paani.missions import MAX_DISTANCE_M
 
 Coordinate = Annotated[float, msgspec.Meta(ge=-MAX_DISTANCE_M, le=MAX_DISTANCE_M)]
 Latitude = Annotated[float, msgspec.Meta(ge=-90.0, le=90.0)]
+OriginLatitude = Annotated[float, msgspec.Meta(ge=-MAX_ORIGIN_LATITUDE_DEG, le=MAX_ORIGIN_LATITUDE_DEG)]
 Longitude = Annotated[float, msgspec.Meta(ge=-180.0, le=180.0)]
 LatLon = tuple[float, float]  # [deg]
 
@@ -25,7 +26,7 @@ LatLon = tuple[float, float]  # [deg]
 class Origin(Section, frozen=True):
     """Where the file's metres are counted from."""
 
-    latitude_deg: Latitude
+    latitude_deg: OriginLatitude
     longitude_deg: Longitude
 
     @property

@@ -10,7 +10,7 @@ import msgspec
 
 from paani.config.section import Section
 from paani.errors import UserError
-from paani.geometry import geodetic_from_enu
+from paani.geometry import MAX_ORIGIN_LATITUDE_DEG, geodetic_from_enu
 from paani.messages import Route
 from paani.missions import MAX_WAYPOINTS, find_repeated_waypoint
 from paani_services.navigator.files.bounded_reading import read_toml
@@ -83,7 +83,7 @@ def require_waypoint_count(line: RouteLine, where: str) -> None:
 
 
 def lat_lon_of_points(line: RouteLine, where: str) -> tuple[LatLon, ...]:
-    """Latitude and longitude of each point [deg]. Raises UserError where the line has metres and no origin."""
+    """Latitude and longitude of each point [deg]. Raises UserError: metres without origin, or beyond a pole."""
 
     def lat_lon_deg(point: FilePoint, number: int) -> LatLon:
         match point:
@@ -92,7 +92,10 @@ def lat_lon_of_points(line: RouteLine, where: str) -> tuple[LatLon, ...]:
             case FilePoint(x_m=float(x_m), y_m=float(y_m), latitude_deg=None, longitude_deg=None):
                 if line.origin_deg is None:
                     raise UserError(f"{where}: origin: waypoints[{number}] in metres needs it (or --origin LAT,LON)")
-                return geodetic_from_enu(x_m, y_m, *line.origin_deg)
+                found_deg = geodetic_from_enu(x_m, y_m, *line.origin_deg)
+                if abs(found_deg[0]) <= 90.0:
+                    return found_deg
+                raise UserError(f"{where}: waypoints[{number}]: lies beyond the pole, seen from the origin")
         raise UserError(f"{where}: waypoints[{number}]: needs x_m and y_m, or latitude_deg and longitude_deg")
 
     return tuple(lat_lon_deg(point, number) for number, point in enumerate(line.points))
@@ -104,6 +107,10 @@ def in_own_metres(line: RouteLine, where: str) -> RouteLine:
     first = line.points[0]
     if origin_deg is None and first.latitude_deg is not None and first.longitude_deg is not None:
         origin_deg = (first.latitude_deg, first.longitude_deg)
+    if origin_deg is not None and abs(origin_deg[0]) > MAX_ORIGIN_LATITUDE_DEG:
+        raise UserError(
+            f"{where}: waypoints[0]: latitude {origin_deg[0]:g} is too near to a pole for metres on a plane"
+        )
     frame = MapFrame(where, origin_deg, origin_deg)
     points = (frame.waypoint_of(point, f"waypoints[{number}]") for number, point in enumerate(line.points))
     return RouteLine(line.name, tuple(FilePoint(x_m=at.x_m, y_m=at.y_m) for at in points), line.repeat, origin_deg)

@@ -212,6 +212,44 @@ def test_without_gpxpy_only_gpx_is_refused(
     assert paani(["route", "convert", str(geojson), str(tmp_path / "a.toml")]) == 0
 
 
+@pytest.mark.parametrize("origin", ["90,2", "-85.1,2", "10,181", "nan,0"])
+def test_an_origin_near_a_pole_is_no_origin(tmp_path: Path, capsys: pytest.CaptureFixture[str], origin: str) -> None:
+    path, out = tmp_path / "a.toml", tmp_path / "a.gpx"
+    path.write_text(TOML)
+    with pytest.raises(SystemExit, match="2"):
+        paani(["route", "convert", str(path), str(out), f"--origin={origin}"])
+    assert f"argument --origin: '{origin}': expected LAT,LON" in capsys.readouterr().err
+    latitude_deg, longitude_deg = origin.split(",")
+    path.write_text(f"{TOML}[origin]\nlatitude_deg = {latitude_deg}\nlongitude_deg = {longitude_deg}\n")
+    assert paani(["route", "convert", str(path), str(out)]) == 2
+    assert "a.toml: " in (said := capsys.readouterr().err)
+    assert "origin" in said
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(("suffix", "origin"), [(".gpx", "10,10"), (".toml", "85,10")])
+def test_an_origin_far_from_the_route_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], suffix: str, origin: str
+) -> None:
+    path, out = tmp_path / f"a{suffix}", tmp_path / "b.toml"
+    path.write_text(GPX if suffix == ".gpx" else TOML.replace("y_m = 0", "y_m = 900000", 1))
+    assert paani(["route", "convert", str(path), str(out), "--origin", origin]) == 2
+    assert capsys.readouterr().err.startswith(
+        f"paani: --origin {float(origin.split(',', 1)[0]):.7f}, 10.0000000: {path}: "
+    )
+    assert not out.exists()
+
+
+def test_a_route_across_the_180th_meridian_is_read_again(tmp_path: Path) -> None:
+    path, gpx, back = (tmp_path / name for name in ("a.toml", "a.gpx", "b.toml"))
+    path.write_text(TOML)
+    assert paani(["route", "convert", str(path), str(gpx), "--origin", "10,180"]) == 0
+    assert paani(["route", "convert", str(gpx), str(back)]) == 0
+    assert [(point.x_m, point.y_m) for point in load_route(back).waypoints] == [
+        (pytest.approx(x_m, abs=1e-3), pytest.approx(y_m, abs=1e-3)) for x_m, y_m in ((0.0, 0.0), (5.0, 5.0))
+    ]
+
+
 def test_metres_without_an_origin_need_one_to_become_latitudes(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -254,3 +292,10 @@ def test_check_refuses_a_route_outside_a_fence_or_a_world(tmp_path: Path, capsys
     land = written(tmp_path, "land.toml", TOML.replace("x_m = 5", "x_m = 5000"))
     assert paani(["route", "check", str(land), "--world", "lake"]) == 2
     assert "waypoints[1]: is outside the fence (world lake)" in capsys.readouterr().err
+
+
+def test_a_route_at_a_pole_has_no_metres(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, out = written(tmp_path, "a.gpx", GPX.replace("47.65", "86.65")), tmp_path / "a.toml"
+    assert paani(["route", "convert", str(path), str(out)]) == 2
+    assert "waypoints[0]: latitude 86.65 is too near to a pole" in capsys.readouterr().err
+    assert not out.exists()
