@@ -5,7 +5,8 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import sys
-from collections.abc import AsyncIterator
+import threading
+from collections.abc import AsyncIterator, Sequence
 from pathlib import Path
 
 import msgspec
@@ -15,9 +16,13 @@ from paani import keys
 from paani import messages as m
 from paani.bus import Bus, Queue
 from paani.clock import WallClock
+from paani.config import load_config
 from paani.logs.folder import recordings
 from paani.logs.reader import open_log
 from paani.logs.repair import is_finished
+from paani_services.recorder.backlog import QueuedMessage
+from paani_services.recorder.recording import Recording
+from paani_services.recorder.service import run
 from tests.conftest import OpenAs, Spawn, put_raw
 from tests.unit.paani.logs.small_logs import JPEG, unfinished
 
@@ -115,30 +120,53 @@ async def test_numbers_that_never_arrived_are_missing(open_as: OpenAs, spawn: Sp
     assert counts["localization/odometry"] == "written=5 dropped=0 missing=4 unreadable=0"
 
 
-async def test_pictures_are_dropped_before_anything_else(open_as: OpenAs, spawn: Spawn, tmp_path: Path) -> None:
-    """P3: a queue of 20 messages takes bursts of pictures; what was dropped is counted, on the bus and in the file."""
-    localization, camera = [await open_as(name) for name in ("localization", "camera")]
-    async with recording(spawn, open_as, tmp_path, "recorder.queue_messages=20") as states:
-        poses, pictures = localization.publisher(keys.ODOMETRY), camera.picture_publisher(keys.PICTURE)
-        for burst in range(5):
+async def test_pictures_are_dropped_before_anything_else(
+    open_as: OpenAs, private_sets: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """P3: while the disk holds up the writing, a queue of 20 messages takes bursts of pictures; what was dropped is
+    counted, on the bus and in the file.
+    """
+    is_held, may_go_on, write, loop = asyncio.Event(), threading.Event(), Recording.write, asyncio.get_running_loop()
+
+    def held_up(recording: Recording, messages: Sequence[QueuedMessage], now_us: int) -> None:
+        if messages:
+            loop.call_soon_threadsafe(is_held.set)
+            may_go_on.wait()
+        write(recording, messages, now_us)
+
+    monkeypatch.setattr(Recording, "write", held_up)
+    sets = (f"recorder.folder={tmp_path}", "recorder.min_free_mib=0", "recorder.queue_messages=20")
+    own = 'recorder.leave_out=["recorder/state", "health/recorder"]'
+    config = load_config(sets=(*private_sets, *sets, own))
+    observer, localization, camera = [await open_as(name) for name in ("observer", "localization", "camera")]
+    states, poses = observer.queue(keys.RECORDER_STATE), localization.publisher(keys.ODOMETRY)
+    pictures = camera.picture_publisher(keys.PICTURE)
+    recorder = asyncio.create_task(run(await open_as("recorder"), CLOCK, config))
+    try:
+        await state_when(states, lambda s: s.recording)
+        poses.put(odometry(0))
+        async with asyncio.timeout(10):
+            await is_held.wait()
+        for burst in range(1, 4):
             for number in range(40):
-                pictures.put_picture(
-                    m.PictureHeader(
-                        source_us=CLOCK.now_us(), frame_seq=number, frame_epoch=burst, width_px=320, height_px=240
-                    ),
-                    JPEG,
+                header = m.PictureHeader(
+                    source_us=CLOCK.now_us(), frame_seq=number, frame_epoch=burst, width_px=320, height_px=240
                 )
+                pictures.put_picture(header, JPEG)
             poses.put(odometry(burst))
-            await asyncio.sleep(0.2)
-        await state_when(
-            states, lambda s: sum(t.written + t.dropped for t in s.topics if t.topic == "camera/picture") == 200
-        )
+            await state_when(states, lambda s, sent=41 * burst: s.waiting + s.dropped == sent)
+        may_go_on.set()
+        await state_when(states, lambda s: any(t.topic == "camera/picture" and t.written for t in s.topics))
+    finally:
+        may_go_on.set()
+        recorder.cancel()
+        await asyncio.gather(recorder, return_exceptions=True)
     log = await recorded(tmp_path)
-    written, dropped, missing, _ = (int(word.partition("=")[2]) for word in log.counts["camera/picture"].split())
-    assert written == len(log.data["camera/picture"])
-    assert (written + dropped, missing) == (200, 0)
-    assert dropped > 0
-    assert log.counts["localization/odometry"].startswith("written=5 dropped=0")
+    assert len(log.data["camera/picture"]) == 17
+    assert log.counts == {
+        "camera/picture": "written=17 dropped=103 missing=0 unreadable=0",
+        "localization/odometry": "written=4 dropped=0 missing=0 unreadable=0",
+    }
 
 
 async def test_an_unfinished_file_is_repaired_while_the_next_is_written(
