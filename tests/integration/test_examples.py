@@ -58,8 +58,6 @@ OF_ANOTHER_PACKAGE = ("lookout",)
 FIRST_TRIP = (ROOT / "docs" / "how-to" / "first-trip.md").read_text(encoding="utf-8")
 BOAT = FIRST_TRIP.partition("```toml\n")[2].partition("```")[0]
 
-RECORDED = drive(12.0)
-
 
 class ParsedError(Exception):
     """Carries what a command understood out of it, before it does anything."""
@@ -100,8 +98,15 @@ def require_loadable(options: argparse.Namespace) -> Config:
     return config
 
 
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("recorded") / "20270101T000000Z-0.mcap"
+    write_log(path, drive(12.0))
+    return path
+
+
 @pytest.fixture
-def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def checkout(tmp_path: Path, recording: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder as the reader has it: the examples, drives that were recorded, and files of the reader's own."""
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     for folder in ("runs/drive", "runs/first", "runs/moored", "runs/segmenter", "mine", "FOLDER"):
@@ -112,7 +117,7 @@ def checkout(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for mission in ("mission.toml", "calibration.toml"):
         (tmp_path / mission).write_bytes((ROOT / "examples" / "mission.toml").read_bytes())
     (tmp_path / "boat.toml").write_text(BOAT, encoding="utf-8")
-    write_log(tmp_path / "runs" / "drive" / "20270101T000000Z-0.mcap", RECORDED)
+    (tmp_path / "runs" / "drive" / recording.name).hardlink_to(recording)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

@@ -47,14 +47,7 @@ class Up:
         return self._err.read_text().splitlines()
 
     def children(self) -> dict[str, int]:
-        """Its services that run now, whoever their parent is."""
-        found = {}
-        for folder in Path("/proc").glob("[0-9]*"):
-            with contextlib.suppress(OSError):
-                words = (folder / "cmdline").read_text().rstrip("\0").split("\0")
-                if words[1:4] == ["-m", "paani_tools.up.child", str(self.process.pid)]:
-                    found[words[-1]] = int(folder.name)
-        return found
+        return children_of(self.process.pid)
 
     def until(self, condition: Callable[[], bool], limit_s: float) -> None:
         deadline_ms = stopwatch_ms() + limit_s * 1e3
@@ -62,6 +55,17 @@ class Up:
             assert self.process.poll() is None, (self.out, self.errors)
             assert stopwatch_ms() < deadline_ms, (self.out, self.errors)
             threading.Event().wait(0.05)
+
+
+def children_of(pid: int) -> dict[str, int]:
+    """The services of a `paani up` that run now, whoever their parent is."""
+    found = {}
+    for folder in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            words = (folder / "cmdline").read_text().rstrip("\0").split("\0")
+            if words[1:4] == ["-m", "paani_tools.up.child", str(pid)]:
+                found[words[-1]] = int(folder.name)
+    return found
 
 
 def words_of(sets: tuple[str, ...], *more: str) -> list[str]:

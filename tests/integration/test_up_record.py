@@ -12,10 +12,11 @@ import pytest
 
 from paani import keys
 from paani import messages as m
+from paani.cli import main as paani
 from paani.config import load_config
 from paani.logs.folder import recordings
 from paani.logs.reader import Log, open_log
-from tests.integration.test_up import READY_S, Up, words_of
+from tests.integration.test_up import READY_S, Up, children_of, words_of
 from tests.unit.paani.logs.small_logs import recorded
 
 DRIVEN_S = 60.0
@@ -84,17 +85,18 @@ def test_a_folder_that_goes_away_stops_nothing_and_is_told_at_the_end(
 
 @pytest.mark.parametrize(("words", "name"), [(("--record",), "--record "), (("--set",), "recorder.folder")])
 def test_a_folder_that_cannot_be_written_is_named(
-    words: tuple[str, ...], name: str, tmp_path: Path, private_sets: tuple[str, ...]
+    words: tuple[str, ...], name: str, tmp_path: Path, private_sets: tuple[str, ...], capfd: pytest.CaptureFixture[str]
 ) -> None:
     """By the option that was given, or by the setting that the recorder reads."""
     (tmp_path / "file").touch()
     folder = tmp_path / "file" / "x"
     given = str(folder) if words == ("--record",) else f"recorder.folder={folder}"
-    up = Up(tmp_path, *words_of(private_sets, "--headless", *words, given))
-    assert up.process.wait(60) == 2, (up.out, up.errors)
-    [line] = up.errors
+    assert paani(["up", *words_of(private_sets, "--headless", *words, given)]) == 2
+    printed = capfd.readouterr()
+    [line] = printed.err.splitlines()
     assert f"{name.strip()} {folder}" in line
-    assert up.children() == {}
+    assert printed.out == ""
+    assert children_of(os.getpid()) == {}
 
 
 def test_without_a_folder_there_is_no_recorder(tmp_path: Path) -> None:
