@@ -51,9 +51,10 @@ def _read_listed_samples(path: Path, samples: Sequence[Sample]) -> list[Sample]:
     known = {str(sample.picture.resolve()): sample for sample in samples}
     try:
         lines = [line.strip() for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
-    except (OSError, UnicodeDecodeError) as error:
+        places = [str(Path(line).resolve()) for line in lines]
+    except (OSError, ValueError, RuntimeError) as error:  # a name with a null byte, a link that leads to itself
         raise UserError(f"{path}: {error}") from error
-    for line in lines:
-        if str(Path(line).resolve()) not in known:
+    for line, place in zip(lines, places, strict=True):
+        if place not in known:
             raise UserError(f"{path}: {line}: not a picture of the chosen sources")
-    return [known[str(Path(line).resolve())] for line in lines]
+    return [known[place] for place in places]

@@ -344,3 +344,10 @@ def test_quantise_command_writes_net_record_and_verdict_t5_t6(
 
 def test_t5_the_times_are_told_as_int8_over_float() -> None:
     assert Timing(6.969, 10.651).ratio == pytest.approx(10.651 / 6.969)
+
+
+def test_a_list_of_what_are_no_names_is_refused_in_one_line(tmp_path: Path) -> None:
+    listed = tmp_path / "list.txt"
+    listed.write_bytes(b"PK\x03\x04\x00\n")
+    with pytest.raises(UserError, match=r"list\.txt: embedded null byte"):
+        choose_calibration_samples([], listed, spread=False)
