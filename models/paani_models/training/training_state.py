@@ -18,6 +18,7 @@ import torch
 from torch import Tensor, nn
 
 from paani.errors import UserError
+from paani.undecodable import UNDECODABLE
 from paani.whole_file import replacement_file
 
 Batch = TypeVar("Batch")
@@ -122,7 +123,7 @@ def read_recipe(checkpoint: Path) -> TrainedWith:
     """Raises UserError naming a checkpoint without a recipe, or with one of other values than a training has."""
     try:
         return msgspec.convert(load_checkpoint(checkpoint).get("recipe"), TrainedWith)
-    except msgspec.ValidationError as error:
+    except UNDECODABLE as error:
         raise UserError(f"{checkpoint}: recipe: {error}") from error
 
 

@@ -65,11 +65,11 @@ def scan(data: Data) -> Iterator[ScannedRecord | Damage]:
         for place in _places_to_resume(data, at, record):
             if in_vain > MAX_TIMES_IN_VAIN * end:
                 break
-            tried, fault = _record(data, place)
+            candidate, fault = _record(data, place)
             if not fault:
                 resumed = place
                 break
-            in_vain += _size_in(data, tried)
+            in_vain += _size_in(data, candidate)
         yield Damage(at, resumed, cause)
         at = resumed
 

@@ -189,6 +189,9 @@ def test_bad_records_are_named(tmp_path: Path) -> None:
         read_training_record(tmp_path)
     with pytest.raises(UserError, match=r"faults\.json"):
         read_faults(tmp_path / "faults.json")
+    (tmp_path / "epochs.jsonl").write_text('{"loss": ' + "9" * 400 + "}\n")
+    with pytest.raises(UserError, match=r"epochs\.jsonl:1: "):
+        read_training_record(tmp_path)
 
 
 def test_faults_are_drawn() -> None:

@@ -222,8 +222,8 @@ def test_an_origin_near_a_pole_is_no_origin(tmp_path: Path, capsys: pytest.Captu
     latitude_deg, longitude_deg = origin.split(",")
     path.write_text(f"{TOML}[origin]\nlatitude_deg = {latitude_deg}\nlongitude_deg = {longitude_deg}\n")
     assert paani(["route", "convert", str(path), str(out)]) == 2
-    assert "a.toml: " in (said := capsys.readouterr().err)
-    assert "origin" in said
+    assert "a.toml: " in (printed := capsys.readouterr().err)
+    assert "origin" in printed
     assert not out.exists()
 
 
@@ -246,7 +246,7 @@ def test_a_route_across_the_180th_meridian_is_read_again(tmp_path: Path) -> None
     assert paani(["route", "convert", str(path), str(gpx), "--origin", "10,180"]) == 0
     assert paani(["route", "convert", str(gpx), str(back)]) == 0
     assert [(point.x_m, point.y_m) for point in load_route(back).waypoints] == [
-        (pytest.approx(x_m, abs=1e-3), pytest.approx(y_m, abs=1e-3)) for x_m, y_m in ((0.0, 0.0), (5.0, 5.0))
+        pytest.approx(place_m, abs=1e-3) for place_m in ((0.0, 0.0), (5.0, 5.0))
     ]
 
 
