@@ -53,27 +53,11 @@ def test_axe_is_the_one_that_its_readme_names() -> None:
     assert hashlib.sha256(AXE.read_bytes()).hexdigest() in AXE.with_name("README.md").read_text(encoding="utf-8")
 
 
-# Rows of a table that differ in nothing but their text have the same colours: axe looks at one of them.
-HIDE_ALIKE = """() => {
-  for (const body of document.querySelectorAll("tbody")) {
-    const seen = new Set();
-    for (const row of body.rows) {
-      const look = (e) => [e.tagName, e.className, e.disabled, e.ariaSelected, !e.textContent].join(" ");
-      const kind = [row, ...row.querySelectorAll("*")].map(look).join();
-      if (seen.has(kind)) row.style.display = "none";
-      seen.add(kind);
-    }
-  }
-}"""
-SHOW_ALL = "for (const row of document.querySelectorAll('tbody tr')) row.style.display = ''"
-
-
 async def faint_in_other_palettes(page: Any, palette: str) -> list[str]:
     """What axe finds too faint in the palettes that this size was not looked at in; of colours nothing else depends."""
     found = []
     for tab in (await page.evaluate(TABS))[::-1]:
         await page.evaluate("(name) => document.querySelector(`[data-tab-of=${name}]`).click()", tab)
-        await page.evaluate(HIDE_ALIKE)
         looked_at = {palette}
         for _ in range(PALETTES):
             await page.keyboard.press("d")
@@ -81,7 +65,6 @@ async def faint_in_other_palettes(page: Any, palette: str) -> list[str]:
             if current not in looked_at:  # the one that the system chooses is one of the others
                 looked_at.add(current)
                 found += [f"{current}, {tab}: {one}" for one in await page.evaluate(FAINT)]
-        await page.evaluate(SHOW_ALL)
     return found
 
 
@@ -135,10 +118,9 @@ async def serious_in_every_palette(page: Any) -> list[str]:
         current = await page.evaluate("document.documentElement.dataset.palette")
         if current in looked_at:
             continue
-        rules = FAINT if looked_at else SERIOUS  # of colours nothing else depends
         looked_at.add(current)
         await page.wait_for_timeout(300)
-        found += [f"{current}: {one}" for one in await page.evaluate(rules)]
+        found += [f"{current}: {one}" for one in await page.evaluate(SERIOUS)]
     return found
 
 

@@ -13,7 +13,7 @@ _NODE, _OUTPUT = 1, 12  # of a graph
 _INPUT_NAME, _OUTPUT_NAME, _OP_TYPE, _ATTRIBUTE = 1, 2, 4, 5  # of a node
 _NAME, _TEXT = 1, 4  # of an attribute; a value begins with its name as well
 _FLOAT32 = b"\x12\x04\x0a\x02\x08\x01"  # a value's type: a tensor of float32, its shape for the reader to infer
-_MAX_VARINT_BITS = 70
+_MAX_VARINT_BITS = 70  # ten groups hold any number of 64 bits
 _VARINT, _EIGHT_BYTES, _LENGTH_FIRST, _FOUR_BYTES = 0, 1, 2, 5
 
 

@@ -34,7 +34,7 @@ from paani_models.image_quality.network import ImageQualityNetwork
 from paani_models.network_input import DETECTOR_SIZE_WH, IMAGE_QUALITY_WH, SIZE_WH
 from paani_models.segmenter.paper_network import PaperSegmenter, parameter_count
 from paani_models.segmenter.shipped_network import ShippedSegmenter
-from paani_models.training.training_state import load_averaged_weights, read_recipe
+from paani_models.training.training_state import TrainedWith, load_averaged_weights, read_recipe
 
 OPSET = 17  # T1
 MAX_EXPORT_DIFFERENCE = 1e-3  # T2; in logits, scores, and boxes as fractions of the input
@@ -159,13 +159,12 @@ def export_network(
         change(net)
     if looks_at is not None:
         net = SmallerInside(net, looks_at)
-    seed = read_recipe(checkpoint).seed
-    return _export_and_place(contract_of(name, checkpoint), net, folder, inputs, origins, seed, licence)
-
-
-def contract_of(name: str, checkpoint: Path) -> Model:
-    """The contract of a network; of a detector, for the size of input that it was trained with. Raises UserError."""
     recipe = read_recipe(checkpoint)
+    return _export_and_place(contract_of(name, recipe), net, folder, inputs, origins, recipe.seed, licence)
+
+
+def contract_of(name: str, recipe: TrainedWith) -> Model:
+    """The contract of a network; of a detector, for the size of input that it was trained with."""
     if name != "detector":
         return CONTRACTS[name]
     return sized_detector(CONTRACTS[name], recipe.height_px or SIZE_WH[1], recipe.width_px or SIZE_WH[0])

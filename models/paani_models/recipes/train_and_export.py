@@ -42,7 +42,7 @@ from paani_models.segmenter.paper_network import PaperSegmenter
 from paani_models.segmenter.pseudo_labels import pseudo_label_pictures
 from paani_models.segmenter.shipped_network import ShippedSegmenter, load_imagenet_encoder
 from paani_models.segmenter.train import PAPER_RECIPE, SegmenterRecipe, SegmenterTraining, cache_pictures
-from paani_models.training.training_state import Stage, load_averaged_weights
+from paani_models.training.training_state import Stage, load_averaged_weights, read_recipe
 
 IMAGENET_FILE = "_weights/mobilenetv2_1.0_imagenet_folded_fp16.npz"
 COCO_FILE = "_weights/yolox_nano_coco.onnx"
@@ -318,7 +318,7 @@ def export_checkpoint(
         else pictures.segmented_samples(held_out=True)
     )
     step = max(1, len(chosen) // COMPARED_PICTURES)
-    size_wh = contract_of(net, checkpoint).size_hw[::-1]
+    size_wh = contract_of(net, read_recipe(checkpoint)).size_hw[::-1]
     prepare = {
         "detector": lambda picture: detector_input(picture, size_wh),
         "yolo11n": lambda picture: detector_input(picture, size_wh),

@@ -13,7 +13,6 @@ from paani.statistics.charts import Points, lines
 from paani.undecodable import UNDECODABLE, UNREADABLE
 from paani_models.catalogue import Figure
 
-UNREPRESENTABLE: tuple[type[Exception], ...] = (*UNDECODABLE, OverflowError)  # a number beyond float's
 RECORDS = ("epochs.jsonl", "log.jsonl")
 
 
@@ -98,7 +97,7 @@ def read_training_record(folder: Path) -> list[dict[str, float]]:
     for number, line in enumerate(lines_of_file, 1):
         try:
             rows.append(_flatten_numbers(msgspec.json.decode(line, type=dict[str, object])))
-        except UNREPRESENTABLE as error:
+        except UNDECODABLE as error:
             raise UserError(f"{path}:{number}: {error}") from error
     return rows
 

@@ -18,6 +18,7 @@ from paani_models.recipes.onnx_export import (  # noqa: E402
     largest_export_difference,
     write_onnx,
 )
+from paani_models.training.training_state import read_recipe  # noqa: E402
 
 pytestmark = [pytest.mark.train, pytest.mark.slow]
 
@@ -72,6 +73,6 @@ def test_a_checkpoint_with_a_recipe_of_no_training_is_named_in_one_line(
     path = tmp_path / "last.pt"
     torch.save(state, path)
     with pytest.raises(UserError) as refused:
-        contract_of("detector", path)
+        contract_of("detector", read_recipe(path))
     assert str(refused.value).startswith(f"{path}: {named}")
     assert len(str(refused.value).splitlines()) == 1
