@@ -145,9 +145,10 @@ def open_workers(address: str | None, processes: int) -> Iterator[Workers]:
     require_modules("--cluster", "distributed", *(("cryptography",) if address == LOCAL else ()))
     from distributed import Client  # noqa: PLC0415
 
-    for name in ("distributed", "tornado", "asyncio"):  # what goes wrong is told once, in a line
-        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
     with contextlib.ExitStack() as stack:
+        for name in ("distributed", "tornado", "asyncio"):  # what goes wrong is told once, in a line
+            stack.callback(logging.getLogger(name).setLevel, logging.getLogger(name).level)
+            logging.getLogger(name).setLevel(logging.CRITICAL + 1)
         if address == LOCAL:
             client = stack.enter_context(Client(stack.enter_context(_local_cluster(processes))))
         else:

@@ -82,7 +82,7 @@ def quantise_network(net: Path, target: Path, recipe: QuantisationRecipe, inputs
     options: dict[str, Any] = {"nodes_to_exclude": find_float_steps(model, recipe)}
     if recipe.operators:
         options["op_types_to_quantize"] = list(recipe.operators)
-    logging.getLogger().setLevel(logging.ERROR)  # it recommends a pre-processing that export has done already
+    logging.getLogger().addFilter(_is_other_than_advice)
     try:
         with replacement_file(target) as beside:
             quantize_static(
@@ -98,7 +98,13 @@ def quantise_network(net: Path, target: Path, recipe: QuantisationRecipe, inputs
             )
             _drop_unused_constants(beside)
     finally:
+        logging.getLogger().removeFilter(_is_other_than_advice)
         float_net.unlink(missing_ok=True)
+
+
+def _is_other_than_advice(record: logging.LogRecord) -> bool:
+    """`quantize_static` recommends, through the root logger, a pre-processing that export has done already."""
+    return "pre-processing" not in record.getMessage()
 
 
 def _drop_unused_constants(path: Path) -> None:

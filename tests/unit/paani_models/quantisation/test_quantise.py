@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from pathlib import Path
 from typing import Any
@@ -210,11 +211,15 @@ def test_with_its_decoding_in_float_the_detector_sees(tmp_path: Path) -> None:
         assert all(fed[name].op_type != "DequantizeLinear" for name in output.input[1:] if name in fed)
 
 
-def test_a_quantised_segmenter_is_checked_and_perceives(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_quantised_segmenter_is_checked_and_perceives(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
+) -> None:
     """It takes and gives floats like any other, so the check lets it pass and perception runs it."""
     samples = [segmenter_input(picture[..., ::-1]) for picture in DRAWN.values()]
     own = tmp_path / "segmenter.onnx"
     quantise_network(verified_path("segmenter"), own, RECIPES["equalised"]["segmenter"], samples)
+    logging.getLogger().warning("what others log afterwards, of pre-processing too, is kept")
+    assert [record.message.split()[0] for record in caplog.records if record.name == "root"] == ["what"]
     assert main(["check", str(own)]) == 0
     assert "8-bit steps are rounded elsewhere" in capsys.readouterr().out
     header = m.PictureHeader(source_us=1, frame_seq=0, frame_epoch=0, width_px=320, height_px=240)
