@@ -5,7 +5,7 @@
 PYTHON ?= python3
 VENV   ?= .venv
 EXTRAS ?= host,dev
-PARTS  ?= 4
+PARTS  ?= 6
 comma  := ,
 LOCKED := base host dev
 # Names no index, and takes one version for all Pythons: what was tested on the host is what the board runs.

@@ -1,7 +1,7 @@
 """Tests that take long and prove no statement of `claims.toml` take turns: a run has one part of them.
 
 `@pytest.mark.rotating(cpu_s=30)` marks such a test, with the processor time [s] that all its cases take together.
-`--parts 4` shares them out to four parts of about the same time and runs the one that the commit draws, so that each
+`--parts 6` shares them out to six parts of about the same time and runs the one that the commit draws, so that each
 has its turn as commits come; the others skip and say so.
 """
 

@@ -30,6 +30,7 @@ def bench(*words: str) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.rotating(cpu_s=4)
 def test_step_and_contract(tmp_path: Path) -> None:
     result = bench("--frames", "5", "--only", "step", "--only", "contract", "--json", str(tmp_path / "figures.json"))
     assert result.returncode == 0, result.stderr

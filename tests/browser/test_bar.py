@@ -164,6 +164,7 @@ def encoded(changes: dict[str, m.Message | None]) -> dict[str, str]:
     return {key: msgspec.json.encode(value).decode() for key, value in messages.items() if value is not None}
 
 
+@pytest.mark.rotating(cpu_s=6)
 async def test_what_the_boat_does_comes_first(
     browser: Any, boat: Boat, open_as: OpenAs, spawn: Spawn, config: Config, tmp_path: Path
 ) -> None:

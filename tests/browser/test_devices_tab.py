@@ -44,6 +44,7 @@ def private_sets(private_sets: tuple[str, ...]) -> tuple[str, ...]:
     return (*private_sets, "profile=hull", f"bridge.line={SHOWS.line}")
 
 
+@pytest.mark.rotating(cpu_s=4)
 async def test_a_hulls_devices_and_its_battery(
     browser: Any, open_as: OpenAs, spawn: Spawn, config: Config, tmp_path: Path
 ) -> None:

@@ -100,6 +100,7 @@ async def test_a_gamepad_drives_by_what_is_in_view_on_every_screen(driven: tuple
         await until(page, "document.querySelector('#drive').dataset.driving === 'false'")
 
 
+@pytest.mark.rotating(cpu_s=7)
 async def test_a_phone_that_is_turned_keeps_picture_and_stick_in_view(
     driven: tuple[Any, Orders], tmp_path: Path
 ) -> None:

@@ -26,6 +26,7 @@ def cells(name: str) -> str:
     return f"[...{row}.children].map((cell) => cell.textContent)"
 
 
+@pytest.mark.rotating(cpu_s=6)
 async def test_a_row_for_each_process_and_the_last_lines_of_its_log(
     browser: Any, boat: Boat, open_as: OpenAs, spawn: Spawn, config: Config
 ) -> None:

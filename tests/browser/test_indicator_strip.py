@@ -37,6 +37,7 @@ def shows(word: str, facts: str) -> str:
     return f"{text.format('word', word)} && {text.format('facts', facts)}"
 
 
+@pytest.mark.rotating(cpu_s=4)
 async def test_the_strip_shows_what_the_microcontroller_shows(
     browser: Any, boat: Boat, open_as: OpenAs, spawn: Spawn, config: Config, tmp_path: Path
 ) -> None:
@@ -69,6 +70,7 @@ async def test_the_strip_shows_what_the_microcontroller_shows(
         assert watched.errors == []
 
 
+@pytest.mark.rotating(cpu_s=4)
 async def test_without_a_bridge_and_devices_there_is_no_strip(
     browser: Any, boat: Boat, open_as: OpenAs, spawn: Spawn, config: Config
 ) -> None:
@@ -79,6 +81,7 @@ async def test_without_a_bridge_and_devices_there_is_no_strip(
         assert await page.evaluate("document.querySelector('#sensors').hidden")
 
 
+@pytest.mark.rotating(cpu_s=4)
 async def test_the_strip_fits_a_phone(browser: Any, boat: Boat, open_as: OpenAs, spawn: Spawn, config: Config) -> None:
     publisher = (await open_as("bridge")).publisher(keys.BRIDGE_STATE)
     async with spawn("dashboard", f"bridge.line={LINE}"):

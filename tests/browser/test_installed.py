@@ -32,6 +32,7 @@ async def given(page: Any) -> tuple[int, int]:
     return tuple(await page.evaluate("[given.tones, given.vibrations]"))
 
 
+@pytest.mark.rotating(cpu_s=7)
 async def test_an_installed_page_alerts_on_demand_and_opens_without_a_network(
     browser: Any, spawn: Spawn, config: Config, tmp_path: Path
 ) -> None:

@@ -124,6 +124,7 @@ async def serious_in_every_palette(page: Any) -> list[str]:
     return found
 
 
+@pytest.mark.rotating(cpu_s=6)
 async def test_recordings_and_the_past_are_legible_in_every_palette(
     browser: Any, boat: Boat, spawn: Spawn, config: Config, tmp_path: Path
 ) -> None:
@@ -144,6 +145,7 @@ async def test_recordings_and_the_past_are_legible_in_every_palette(
         assert await serious_in_every_palette(page) == []
 
 
+@pytest.mark.rotating(cpu_s=4)
 async def test_a_replay_is_legible_in_every_palette(browser: Any, spawn: Spawn, config: Config, tmp_path: Path) -> None:
     recording = await asyncio.to_thread(finished, tmp_path, 200, 20)
     async with spawn("dashboard", f"dashboard.replayed={recording}"):

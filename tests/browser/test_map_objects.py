@@ -169,6 +169,7 @@ async def check_headings(page: Any, folder: Path) -> None:
     await page.click("#map-headings")
 
 
+@pytest.mark.rotating(cpu_s=7)
 async def test_the_map_shows_what_the_boat_is_told_and_what_comes(
     browser: Any, open_as: OpenAs, spawn: Spawn, config: Config, tmp_path: Path
 ) -> None:

@@ -60,6 +60,7 @@ async def test_the_tiles_below_a_part_of_the_map(scripts_page: Any) -> None:
     assert whole[2] == [], "too many to draw"
 
 
+@pytest.mark.rotating(cpu_s=4)
 async def test_the_chart_lies_below_the_map(
     browser: Any, open_as: OpenAs, spawn: Spawn, config: Config, tmp_path: Path
 ) -> None:

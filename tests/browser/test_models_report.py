@@ -26,6 +26,7 @@ def report(tmp_path: Path) -> Path:
     return out / "index.html"
 
 
+@pytest.mark.rotating(cpu_s=4)
 @pytest.mark.parametrize("width", [1280, 390])
 async def test_the_report_shows_everything(browser: Any, report: Path, width: int) -> None:
     page = await browser.new_page(viewport={"width": width, "height": 800})

@@ -269,6 +269,7 @@ async def test_arming_needs_a_hold_that_has_not_expired(browser: Any, boat: Boat
             assert not boat.arming.value.armed, held_s
 
 
+@pytest.mark.rotating(cpu_s=4)
 async def test_a_phone_shows_everything_without_scrolling_sideways(
     browser: Any, boat: Boat, spawn: Spawn, config: Config
 ) -> None:
@@ -282,6 +283,7 @@ async def test_a_phone_shows_everything_without_scrolling_sideways(
         await wait_for_arming(boat, armed=False, stopped=True)
 
 
+@pytest.mark.rotating(cpu_s=3)
 async def test_the_choice_of_frame(scripts_page: Any) -> None:
     """The pure chooser, in the engine that runs it."""
     choose = """async ([pictures, evidence, masks]) => {

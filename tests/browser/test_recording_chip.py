@@ -28,6 +28,7 @@ def state(**changes: Any) -> m.RecorderState:
     return m.RecorderState(source_us=now_us, since_us=now_us - 720_000_000, **(fields | changes))
 
 
+@pytest.mark.rotating(cpu_s=4)
 async def test_the_page_says_whether_it_records(
     browser: Any, boat: Boat, open_as: OpenAs, spawn: Spawn, config: Config, tmp_path: Path
 ) -> None:

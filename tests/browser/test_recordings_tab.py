@@ -28,6 +28,7 @@ async def press(page: Any, text: str) -> None:
     await page.click(f'#recordings [data-name="{NAME}"] button:has-text("{text}")')
 
 
+@pytest.mark.rotating(cpu_s=5)
 async def test_a_recording_is_played_protected_and_deleted(
     browser: Any, boat: Boat, spawn: Spawn, config: Config, tmp_path: Path
 ) -> None:

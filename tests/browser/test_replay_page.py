@@ -25,6 +25,7 @@ def private_sets(private_sets: tuple[str, ...]) -> tuple[str, ...]:
     return (*private_sets, f"bus.vessel=otter{keys.REPLAY_SUFFIX}")
 
 
+@pytest.mark.rotating(cpu_s=3)
 async def test_a_replay_raises_no_alarm(
     browser: Any, open_as: OpenAs, spawn: Spawn, config: Config, tmp_path: Path
 ) -> None:
@@ -63,6 +64,7 @@ async def test_a_replay_raises_no_alarm(
         assert watched.errors == []
 
 
+@pytest.mark.rotating(cpu_s=6)
 async def test_the_replayed_file_is_played_by_the_same_controls(
     browser: Any, spawn: Spawn, config: Config, tmp_path: Path
 ) -> None:
@@ -101,6 +103,7 @@ async def test_the_replayed_file_is_played_by_the_same_controls(
         assert watched.errors == []
 
 
+@pytest.mark.rotating(cpu_s=4)
 async def test_a_replay_that_could_not_be_read_at_first_is_read_again(
     browser: Any, spawn: Spawn, config: Config, tmp_path: Path
 ) -> None:

@@ -192,6 +192,7 @@ async def test_land_is_drawn_marked_at_its_place_and_refused_when_it_is_sent(
         assert [line for line in watched.errors if "409" not in line] == []
 
 
+@pytest.mark.rotating(cpu_s=6)
 async def test_a_mission_is_drawn_checked_and_sent_as_one(
     browser: Any, open_as: OpenAs, spawn: Spawn, config: Config, tmp_path: Path
 ) -> None:

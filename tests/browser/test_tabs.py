@@ -18,6 +18,7 @@ CELLS = "[...document.querySelectorAll('#topics tr td')].map((cell) => cell.text
 SIZE, VALUE = "document.querySelectorAll('#topics tr').length", "document.querySelector('#topic-value').textContent"
 
 
+@pytest.mark.rotating(cpu_s=3)
 async def test_a_topic_says_where_it_is_from_how_often_it_comes_its_age_and_its_size(
     browser: Any, boat: Boat, spawn: Spawn, config: Config
 ) -> None:
@@ -45,6 +46,7 @@ async def is_changing(page: Any, expression: str) -> bool:
     return bool(await page.evaluate(expression) != before)
 
 
+@pytest.mark.rotating(cpu_s=4)
 async def test_topics_are_searched_chosen_and_frozen(browser: Any, boat: Boat, spawn: Spawn, config: Config) -> None:
     async with spawn("dashboard"):
         watched = await watch(browser, config, 900, 500)

@@ -32,6 +32,7 @@ TRIED = m.Shadow(
 SHOWN = "!document.querySelector('#tuning').hidden"
 
 
+@pytest.mark.rotating(cpu_s=4)
 async def test_the_strip_shows_parameters_in_force_and_on_trial(
     browser: Any, boat: Boat, open_as: OpenAs, spawn: Spawn, config: Config, tmp_path: Path
 ) -> None:
@@ -95,6 +96,7 @@ async def test_the_strip_shows_parameters_in_force_and_on_trial(
         assert watched.errors == []
 
 
+@pytest.mark.rotating(cpu_s=3)
 async def test_the_strip_fits_a_phone(browser: Any, boat: Boat, open_as: OpenAs, spawn: Spawn, config: Config) -> None:
     publisher = (await open_as("advisor")).publisher(keys.SHADOW)
     async with spawn("dashboard"):

@@ -25,6 +25,7 @@ class TimerPulses:
         return self._mcu.pins.enable
 
 
+@pytest.mark.rotating(cpu_s=4)
 async def test_both_sides_are_found_on_the_emulated_microcontroller(tmp_path: Path) -> None:
     """And the thrusters have been driven while the key was held, and only then."""
     async with open_emulator(pty=True) as mcu, calibrating(tmp_path, TimerPulses(mcu), mcu.thrust) as operator:

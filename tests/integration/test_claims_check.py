@@ -103,6 +103,7 @@ def test_mutants_are_killed_or_survive_and_a_test_that_does_not_pass_is_named(
     assert record.read_bytes() == before
 
 
+@pytest.mark.rotating(cpu_s=4)
 def test_a_changed_product_is_tried_again(product: Path) -> None:
     """And a line of the record that was cut off counts as unknown."""
     assert main(["--rows", "H1"], product) == 0

@@ -195,6 +195,7 @@ def test_what_was_ready_is_kept_when_nobody_takes_more(tmp_path: Path) -> None:
     assert done.stdout == "[0, 1, 2] ['0', '1', '2']\n", done.stderr
 
 
+@pytest.mark.rotating(cpu_s=5)
 def test_networks_are_scored_on_a_cluster_as_here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The evaluation of both networks is that of one process to the last bit, though batches come back in any order."""
     pictures = PictureSelection(own_data(tmp_path, 6), ["tbiseg_dasha", "mcoe_boats"], None)
@@ -207,6 +208,7 @@ def test_networks_are_scored_on_a_cluster_as_here(tmp_path: Path, monkeypatch: p
         assert [each.sample.picture for each in one] == [each.sample.picture for each in other]
 
 
+@pytest.mark.rotating(cpu_s=6)
 def test_a_cluster_that_cannot_work_is_told_in_a_line(tmp_path: Path, scheduler: Scheduler) -> None:
     """Nobody there, no certificates, no workers; and no folder is made for results."""
     nobody = f"tcp://127.0.0.1:{find_free_port()}"
@@ -225,6 +227,7 @@ def test_a_cluster_that_cannot_work_is_told_in_a_line(tmp_path: Path, scheduler:
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.rotating(cpu_s=4)
 def test_a_worker_with_other_code_gets_no_work(tmp_path: Path, scheduler: Scheduler) -> None:
     copy = tmp_path / "other" / "paani"
     shutil.copytree(Path(paani.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))

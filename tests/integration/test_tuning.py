@@ -54,6 +54,7 @@ async def until(inbox: Any, wanted: Any) -> Any:
                 return value
 
 
+@pytest.mark.rotating(cpu_s=6)
 async def test_two_steps_forth_and_one_back(
     open_as: OpenAs, spawn: Spawn, perception: Bus, private_sets: tuple[str, ...], config: Config
 ) -> None:
@@ -95,6 +96,7 @@ async def test_two_steps_forth_and_one_back(
         assert (code, errors.count("\n")) == (2, 1)
 
 
+@pytest.mark.rotating(cpu_s=3)
 async def test_a_restarted_advisor_is_back_at_its_configuration(
     open_as: OpenAs, spawn: Spawn, perception: Bus, private_sets: tuple[str, ...]
 ) -> None:

@@ -80,6 +80,7 @@ def test_a_constant_left_ends_within_90_degrees_and_stops_the_boat(launch: Launc
     assert boat.plant.velocity[0] > 0.5
 
 
+@pytest.mark.rotating(cpu_s=5)
 def test_m5_a_constant_left_turns_the_paper_s_boat_in_circles(launch: Launch) -> None:
     """M5: with the paper's profile a constant LEFT turns the boat through more than a full circle."""
     boat = launch(open_water("lake"), "paper")

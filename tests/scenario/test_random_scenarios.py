@@ -19,6 +19,7 @@ def scenarios(request: pytest.FixtureRequest) -> tuple[Scenario, ...]:
     return tuple(draw_random_scenario(request.param, seed) for seed in range(SEEDS))
 
 
+@pytest.mark.rotating(cpu_s=3)
 def test_scenarios_are_fair(scenarios: tuple[Scenario, ...]) -> None:
     """Route in the water, start clear, paths afloat, and a gap beside whatever stands in the way."""
     for scenario in scenarios:

@@ -156,6 +156,7 @@ def drive_log(*, broken: bool) -> bytes:
     return "".join(text).encode()
 
 
+@pytest.mark.rotating(cpu_s=7)
 async def test_a_drive_of_known_truth_is_estimated_from_its_log() -> None:
     """Healthy from the tenth second on, although every 29th sentence is damaged; pose and speed are right."""
     found = await estimates(drive_log(broken=True), circling)
@@ -190,6 +191,7 @@ async def test_a_moored_boats_log_gives_the_same_fixes_over_the_wire_and_no_froz
     assert sum(moving) < 0.05 * len(moving)  # most of it while rest is first being found
 
 
+@pytest.mark.rotating(cpu_s=6)
 @pytest.mark.data
 @pytest.mark.skipif(not LOGS.is_dir(), reason=f"no logs at {LOGS}; set PAANI_DATA")
 async def test_a_sailing_log_without_heading_and_accuracy_is_followed_and_never_believed() -> None:

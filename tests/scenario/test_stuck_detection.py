@@ -48,6 +48,7 @@ def test_four_minutes_of_a_stuck_detection_turn_the_boat_no_further_than_the_cap
     assert boat.command.inhibits == (m.Inhibit.TURN_CAPPED,)
 
 
+@pytest.mark.rotating(cpu_s=4)
 def test_the_papers_boat_goes_round_and_round(launch: Launch) -> None:
     """M5 as written, with the same detection."""
     turned = turned_deg(under_way(launch, "paper"), seeing(box(m.Label.PIER, (0.40, 0.30, 0.60, 0.70), 0.9)), 120.0)

@@ -123,6 +123,7 @@ def test_w12_other_rules_are_settings(tmp_path: Path) -> None:
     assert max(y_m for _, _, y_m in bound.track) > 1.0
 
 
+@pytest.mark.rotating(cpu_s=3)
 def test_a_drive_that_diverges_is_no_success_of_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Alone or in a suite: exit 1, one line, and not among the completed."""
     vessel = tmp_path / "stiff.toml"

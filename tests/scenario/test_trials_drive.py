@@ -87,6 +87,7 @@ def test_a_drive_ends_at_its_time_limit(launch: Launch) -> None:
     assert result.latency.samples == 0
 
 
+@pytest.mark.rotating(cpu_s=6)
 def test_a_drive_ends_after_two_minutes_without_progress(launch: Launch) -> None:
     given = scenario(50.0, 200.0, Fault(FaultKind.LINK_LOSS, 4.0, 200.0), alone=True)
     result = result_of(launch(given, Policy.BLIND), Policy.BLIND)
@@ -169,6 +170,7 @@ def test_ground_truth_evidence_agrees_with_the_renderer(down_deg: float) -> None
     assert all(0.0 <= x1 < x2 <= 1.0 and 0.0 <= y1 < y2 <= 1.0 for _, (x1, y1, x2, y2) in seen.boxes)
 
 
+@pytest.mark.rotating(cpu_s=5)
 @pytest.mark.gl
 @pytest.mark.parametrize("name", ["river", "lake"])
 def test_ground_truth_water_is_the_rendered_water(name: str) -> None:

@@ -187,6 +187,7 @@ VALUES = st.recursive(
 )
 
 
+@pytest.mark.rotating(cpu_s=3)
 @given(VALUES, st.binary(max_size=20))
 @pytest.mark.slow
 def test_the_end_of_every_value_is_found(value: object, behind: bytes) -> None:

@@ -188,6 +188,7 @@ def test_t4_the_input_is_scaled_by_the_least_and_the_greatest_of_all_calibration
     assert float(stored[first.input[1]]) == pytest.approx(widest / 255, rel=1e-4)
 
 
+@pytest.mark.rotating(cpu_s=4)
 def test_a_fully_quantised_detector_goes_blind_and_is_rejected(tmp_path: Path) -> None:
     """Boxes up to 320 and scores up to 1 share one step, of more than 1: scores are 0, or no scores."""
     net, samples = verified_path("detector"), [detector_input(river(seed), (416, 320)) for seed in range(3)]
@@ -211,6 +212,7 @@ def test_with_its_decoding_in_float_the_detector_sees(tmp_path: Path) -> None:
         assert all(fed[name].op_type != "DequantizeLinear" for name in output.input[1:] if name in fed)
 
 
+@pytest.mark.rotating(cpu_s=6)
 def test_a_quantised_segmenter_is_checked_and_perceives(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
 ) -> None:

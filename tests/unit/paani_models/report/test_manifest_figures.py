@@ -101,6 +101,7 @@ def test_rivers_without_craft_raise_few_alarms() -> None:
     assert figure.value <= 0.3
 
 
+@pytest.mark.rotating(cpu_s=5)
 def test_nothing_reads_as_water_v15() -> None:
     figure = measure_null_pictures(verified_path("segmenter"))
     assert figure.value <= 0.05

@@ -273,6 +273,7 @@ def test_nothing_measured_records_nothing(data: Path, tmp_path: Path, capsys: py
     assert (weights / "manifest.json").read_bytes() == manifest
 
 
+@pytest.mark.rotating(cpu_s=4)
 def test_a_class_that_is_nowhere_has_no_figure(tmp_path: Path) -> None:
     water = np.random.default_rng(1).normal((90, 80, 60), 6.0, (240, 320, 3)).clip(0, 255).astype(np.uint8)
     picture, truth = tmp_path / "a.png", tmp_path / "mask.png"

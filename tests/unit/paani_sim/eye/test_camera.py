@@ -140,6 +140,7 @@ def test_cox_munk_slope_grows_with_wind() -> None:
     assert mean_square_slope(5.0) == pytest.approx(0.0286)
 
 
+@pytest.mark.rotating(cpu_s=4)
 def test_sprites_are_seeded() -> None:
     first = paint_sprites(1)
     assert np.array_equal(first, paint_sprites(1))

@@ -186,6 +186,7 @@ def test_actors_are_drawn_where_the_plant_says(eye: Eye, river: World) -> None:
         eye.render(pose, 40.0, by_time[:1])
 
 
+@pytest.mark.rotating(cpu_s=6)
 @pytest.mark.parametrize(("supersample", "first_row"), [(1.0, 115), (1.25, 125), (1.5, 125)])
 @pytest.mark.parametrize(("roll_rad", "pitch_rad"), [pytest.param(0.0, 0.0, marks=pytest.mark.long), (0.06, -0.03)])
 def test_depth_of_water_is_that_of_the_plane(
@@ -291,6 +292,7 @@ def test_missing_gl_is_one_line_with_the_packages() -> None:
     assert "libegl1 libopengl0 libgl1-mesa-dri" in done.stdout
 
 
+@pytest.mark.rotating(cpu_s=6)
 def test_dataset_has_the_form_of_the_sources(tmp_path: Path) -> None:
     _require_gl()
     out = tmp_path / "pictures"

@@ -56,6 +56,7 @@ def test_w7_only_the_condition_of_a_world_changes() -> None:
         )
 
 
+@pytest.mark.rotating(cpu_s=7)
 @pytest.mark.slow
 @pytest.mark.parametrize("world", ["canal", "waterway"])
 def test_more_people_are_met_where_the_sweep_says_so(world: str) -> None:

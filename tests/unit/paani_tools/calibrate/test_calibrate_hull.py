@@ -162,6 +162,7 @@ def test_a_drive_with_holes_or_without_heading_is_refused(rich: Messages) -> Non
         drive_of(rich.applied, rich.odometry, blind, rich.samples)
 
 
+@pytest.mark.rotating(cpu_s=6)
 @pytest.mark.slow
 def test_a_fix_far_off_is_left_out(rich: Messages) -> None:
     """One fix in thirty claims 5 m/s to the north, in the first half of the drive."""
