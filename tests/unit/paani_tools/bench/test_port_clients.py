@@ -9,8 +9,8 @@ import pytest
 
 from paani import messages as m
 from paani_services.nmea.sentences import position_sentences
-from paani_tools.bench.port_clients import REMEMBERED, PoseStamps, gga_time_s
-from paani_tools.bench.port_steering import follows
+from paani_tools.bench.ports.clients import REMEMBERED, PoseStamps, gga_time_s
+from paani_tools.bench.ports.steering import follows
 
 NOON_US = 1_700_049_600_000_000  # 12:00:00 UTC
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from paani.cli import main as paani
-from paani_tools.bench.ports import StickLatencies, keeps_bars, ports_report, ports_text
+from paani_tools.bench.ports.figures import StickLatencies, keeps_bars, ports_report, ports_text
 from paani_tools.up.run_summary import Report, ServiceFigures
 
 HEARD = {"nmea": [0.01, 0.02, 0.03]}

@@ -17,8 +17,8 @@ from paani_services.mavlink.codec import dialect as mavlink
 from paani_services.ros2 import topics
 from paani_services.ros2.commands import TAKE_WHEEL
 from paani_services.ros2.schemas import encode, make
-from paani_tools.bench.port_clients import GroundStation, ground_station, ros_node
-from paani_tools.bench.ports import StickLatencies
+from paani_tools.bench.ports.clients import GroundStation, ground_station, ros_node
+from paani_tools.bench.ports.figures import StickLatencies
 
 REPEAT_S = 0.1  # of a stick: within the dead man's time
 ANSWER_S = 3.0  # of a stick that no thrust follows

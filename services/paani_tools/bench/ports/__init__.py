@@ -1,0 +1,1 @@
+"""`paani bench ports`: what the ports to other programs take, and how late they tell and obey."""
