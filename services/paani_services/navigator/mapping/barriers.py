@@ -49,7 +49,7 @@ def update_barriers(memory: BarrierMemory, grid: OccupancyGrid, now_us: int) -> 
     part = slice(low, low + SPLIT * count), slice(left, left + SPLIT * count)
     stands = np.any((grid.occupied & ~grid.possible_people)[part].reshape(shape), axis=(1, 3))
     is_free = np.all(grid.free[part].reshape(shape), axis=(1, 3))
-    second = now_us // 1_000_000
+    second = now_us // 1_000_000 % (1 << 31)  # A clock that is wrong may be decades ahead.
     old = _cells_of(memory)
     old = old[second - old[:, 2] <= REMEMBERED_S]
     off = np.abs(old[:, :2] - (west + count // 2, south + count // 2))

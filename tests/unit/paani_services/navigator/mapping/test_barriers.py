@@ -76,16 +76,17 @@ def test_it_stays_where_it_was_until_it_is_seen_free(first: tuple[int, int], sec
         assert places_of(update_barriers(memory, free, START_US + 1_000_000), at_m) == places_of(memory, at_m)
 
 
-def test_what_is_far_off_or_old_is_forgotten_and_what_is_seen_again_is_not() -> None:
-    memory = update_barriers(BarrierMemory(), grid_with((-50, -50), (10, 10)), START_US)
+@pytest.mark.parametrize("start_us", [START_US, 3_000_000_000_000_000])  # the second of a clock that is wrong
+def test_what_is_far_off_or_old_is_forgotten_and_what_is_seen_again_is_not(start_us: int) -> None:
+    memory = update_barriers(BarrierMemory(), grid_with((-50, -50), (10, 10)), start_us)
     unseen = grid_with((-50, -50))._replace(free=np.zeros((GRID_CELLS, GRID_CELLS), np.bool_))
-    late_us = START_US + round((REMEMBERED_S + 2.0) * 1e6)
+    late_us = start_us + round((REMEMBERED_S + 2.0) * 1e6)
     assert places_of(update_barriers(memory, unseen, late_us)) == set()
-    again = update_barriers(memory, grid_with((-50, -50), (10, 10)), START_US + 300_000_000)
+    again = update_barriers(memory, grid_with((-50, -50), (10, 10)), start_us + 300_000_000)
     assert places_of(update_barriers(again, unseen, late_us)) == {(5, 5)}
     assert len(again.cells) == len(memory.cells)
     away = unseen._replace(west_m=BARRIER_CELLS * BARRIER_CELL_M)
-    assert update_barriers(memory, away, START_US + 1_000_000).cells == b""
+    assert update_barriers(memory, away, start_us + 1_000_000).cells == b""
 
 
 @pytest.mark.parametrize(("step_us", "epochs", "is_kept"), [(50_000, 0, True), (700_000, 0, False), (50_000, 1, False)])
