@@ -21,10 +21,13 @@ class WaypointPath(NamedTuple):
 
 
 def nearest_leg(path: WaypointPath, position_m: Point) -> int:
-    """Target waypoint of the leg nearest to the boat, so that a path may be joined anywhere."""
+    """Target waypoint of the leg nearest to the boat, so that a path may be joined anywhere.
+
+    Of two legs that are as near, to the millimetre, as where their corner is nearest, it is the first.
+    """
     count = len(path.waypoints)
     targets = range(count) if path.repeat else range(1, count)
-    return min(targets, key=lambda target: _distance_to_leg_m(path, target, position_m))
+    return min(targets, key=lambda target: round(_distance_to_leg_m(path, target, position_m), 3))
 
 
 def is_waypoint_reached(path: WaypointPath, target: int, position_m: Point, config: NavigatorConfig) -> bool:
