@@ -7,7 +7,7 @@ import math
 import msgspec
 
 from paani.geometry import enu_from_geodetic, geodetic_from_enu
-from paani.messages import Odometry
+from paani.messages import Odometry, OperatorOrder
 
 MAP_MOVED_M = 2.0  # of one map the origin is found to the millimetre; two starts of a receiver differ by metres
 
@@ -26,6 +26,12 @@ def map_place_of(pose: Odometry | None) -> MapPlace | None:
     if pose is None or not pose.healthy or (pose.latitude_deg, pose.longitude_deg) == (0.0, 0.0):
         return None
     return MapPlace(pose.x_m, pose.y_m, pose.latitude_deg, pose.longitude_deg)
+
+
+def map_place_of_order(order: OperatorOrder) -> MapPlace | None:
+    """The origin of the map in which the order's target and mission were placed; None where it does not say."""
+    latitude_deg, longitude_deg = order.map_latitude_deg, order.map_longitude_deg
+    return MapPlace(0.0, 0.0, latitude_deg, longitude_deg) if (latitude_deg, longitude_deg) != (0.0, 0.0) else None
 
 
 def is_map_moved(known: MapPlace | None, now: MapPlace | None) -> bool:

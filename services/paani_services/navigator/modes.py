@@ -13,6 +13,7 @@ import msgspec
 from paani.config import NavigatorConfig
 from paani.fence_geometry import Fence
 from paani.geometry import wrap_rad
+from paani.map_origin import is_map_moved, map_place_of, map_place_of_order
 from paani.messages import (
     DriveMode,
     Inhibit,
@@ -105,7 +106,8 @@ def _find_faults(
         is_old = any(is_out_of_date(each, limit_s, now_us, config) for each in (inputs.order_us, order.source_us))
     # Neither the mission nor the fence that the order is for has come yet.
     is_for_other = order.mission_us not in {0, 0 if mission is None else mission.accepted_us}
-    return [Inhibit.STALE_ORDER] * is_old + [Inhibit.NO_ROUTE] * is_for_other
+    is_elsewhere = is_map_moved(map_place_of_order(order), map_place_of(inputs.odometry))
+    return [Inhibit.STALE_ORDER] * is_old + [Inhibit.NO_ROUTE] * is_for_other + [Inhibit.MAP_MOVED] * is_elsewhere
 
 
 def _stand(
@@ -121,7 +123,7 @@ def _stand(
     """No thrust, for these reasons and those that there would be anyway."""
     state, inhibits = begin_step(state, inputs, now_us, domain, config, camera)
     state = hold_cross_track(state, now_us)
-    return state, build_command(state, inputs, now_us, [*inhibits, *reasons], leg=leg)
+    return state, build_command(state, inputs, now_us, list(dict.fromkeys([*inhibits, *reasons])), leg=leg)
 
 
 def _run_errand(

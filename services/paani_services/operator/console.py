@@ -13,6 +13,7 @@ from paani import keys
 from paani import messages as m
 from paani.bus import Publisher
 from paani.clock import Clock, has_passed
+from paani.map_origin import MapPlace, map_origin_deg
 from paani.missions import find_mission_fault
 from paani_services.operator import missions
 from paani_services.operator import state as op
@@ -53,6 +54,7 @@ class Console:
         self.state, self.wheel, self.mission = op.Operator(), w.Wheel(), missions.NO_MISSION
         self._mission_answer, self._mission_answers = missions.MissionAnswer(), dict[str, missions.MissionAnswer]()
         self._is_checking = False
+        self._map_place: MapPlace | None = None  # by which the map is known that target and mission were placed in
 
     async def restore(self) -> None:
         """Restore the latch of an earlier run. A missing or unreadable latch counts as a STOP."""
@@ -207,7 +209,15 @@ class Console:
 
     def _order(self, now_us: int) -> m.OperatorOrder:
         order = w.order_message(self.wheel, now_us, armed=self.state.armed)
-        return msgspec.structs.replace(order, mission_us=self.mission.accepted_us)
+        is_placed = bool(order.target) or self.mission.accepted_us > 0
+        self._map_place = (self._map_place or self._facts().map_place) if is_placed else None
+        latitude_deg, longitude_deg = (0.0, 0.0) if self._map_place is None else map_origin_deg(self._map_place)
+        return msgspec.structs.replace(
+            order,
+            mission_us=self.mission.accepted_us,
+            map_latitude_deg=latitude_deg,
+            map_longitude_deg=longitude_deg,
+        )
 
     def _facts(self) -> w.Facts:
         """What the modes need now; what was accepted here is in force as soon as the navigator hears it."""

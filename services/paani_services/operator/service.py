@@ -12,6 +12,7 @@ from paani import messages as m
 from paani.bus import Bus, Latest, Queue
 from paani.clock import Clock
 from paani.config import Config
+from paani.map_origin import map_place_of
 from paani.missions import mission_of_route
 from paani.runtime import own_runtime_dir
 from paani_services.operator.console import Console
@@ -88,6 +89,7 @@ def facts_reader(bus: Bus, clock: Clock) -> Callable[[], Facts]:
             has_mission=mission is not None and bool(mission.legs),
             mission=mission,
             occupancy=grids.fresh(keys.OCCUPANCY.fresh_s),
+            map_place=map_place_of(pose),
         )
 
     return read

@@ -11,6 +11,7 @@ from msgspec.structs import replace
 
 from paani import messages as m
 from paani.keys import STOPPING_CLIENTS
+from paani.map_origin import MapPlace
 from paani.messages import DriveMode, ModeRefusal, OverrideEnd, RequestAct
 from paani_services.operator.missions import NO_MISSION
 from paani_services.operator.return_place import choose_place
@@ -27,6 +28,7 @@ class Facts(msgspec.Struct, frozen=True):
 
     `mission`: the one in force, without legs where there is none; None where that is not known. `occupancy`: what the
     boat has seen around it, None where that is not fresh. `margin_m`: the least distance of a place from the fence.
+    `map_place`: by which the map is known that places lie in; None without a trusted position.
     """
 
     position: m.Waypoint | None = None
@@ -35,6 +37,7 @@ class Facts(msgspec.Struct, frozen=True):
     mission: m.Mission | None = None
     occupancy: m.OccupancyGrid | None = None
     margin_m: float = 0.0
+    map_place: MapPlace | None = None
 
 
 class Stick(msgspec.Struct, frozen=True):

@@ -7,7 +7,7 @@ from enum import StrEnum
 import msgspec
 
 from paani.messages.guidance import Waypoint
-from paani.messages.header import Count, Message, NonNegative, Signed, Stamp, Text
+from paani.messages.header import Count, Finite, Message, NonNegative, Signed, Stamp, Text
 from paani.messages.mission import MissionRefusal
 
 
@@ -123,6 +123,8 @@ class OperatorOrder(Message, frozen=True, kw_only=True):
     of the start. `target`: the station of HOLD, or where RETURN leads to. `surge`, `turn`: what the hand says,
     ahead and to port. `by`, `hand`: who holds the wheel. `override`: the advice does not veto. `mission_us`:
     `accepted_us` of the mission that is in force; 0: none was accepted in this run of the operator's process.
+    `map_latitude_deg`, `map_longitude_deg`: where the origin of the map lay on Earth in which target and mission were
+    placed; 0: not known, or nothing was placed.
     """
 
     mode: DriveMode
@@ -134,6 +136,8 @@ class OperatorOrder(Message, frozen=True, kw_only=True):
     hand: Count = 0
     override: bool = False
     mission_us: Stamp = 0
+    map_latitude_deg: Finite = 0.0
+    map_longitude_deg: Finite = 0.0
 
 
 class OperatorState(Message, frozen=True, kw_only=True):

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from paani import messages as m
 from paani.geometry import geodetic_from_enu
 from paani.map_origin import MAP_MOVED_M, is_map_moved, map_place_of
-from paani.messages import Inhibit
+from paani.messages import DriveMode, Inhibit
+from paani_services.navigator.modes import follow_order
 from paani_services.navigator.navigate import NavigatorState, navigate
 from tests.unit.paani_services.navigator.test_interlocks import MISSION
 from tests.unit.paani_services.navigator.test_navigate import NOW_US, PAANI, inputs
@@ -68,3 +69,22 @@ def test_a_simulation_that_was_reset_may_begin_anywhere(*, is_reset: bool) -> No
     elsewhere = geodetic_from_enu(60.0, 0.0, *ORIGIN_DEG)
     _, found = halts(state, estimate(0.0, 0.0, elsewhere), 1000 if is_reset else NOW_US + 50_000)
     assert (Inhibit.MAP_MOVED in found) is not is_reset
+
+
+@pytest.mark.parametrize("mode", DriveMode)
+@pytest.mark.parametrize("is_begun_anew", [False, True])
+def test_what_was_placed_in_another_map_moves_no_boat_whose_navigator_began_anew(
+    mode: DriveMode, *, is_begun_anew: bool
+) -> None:
+    state = NavigatorState() if is_begun_anew else halts(NavigatorState(), estimate(0.0, 0.0))[0]
+    latitude_deg, longitude_deg = ORIGIN_DEG
+    order = m.OperatorOrder(
+        source_us=NOW_US, mode=mode, since_us=1, surge=0.5, map_latitude_deg=latitude_deg,
+        map_longitude_deg=longitude_deg,
+    )  # fmt: skip
+    for moved_m in (0.0, 60.0):
+        heard = inputs(
+            odometry=estimate(0.0, 0.0, geodetic_from_enu(moved_m, 0.0, *ORIGIN_DEG)), order=order, order_us=NOW_US
+        )
+        _, command = follow_order(state, heard, MISSION, NOW_US, 43, PAANI)
+        assert command.inhibits.count(Inhibit.MAP_MOVED) == (moved_m > 0.0)
