@@ -193,7 +193,8 @@ def _steer_by_hand(
     heading_rad = speed_mps = 0.0
     if odometry is not None and not inhibits:
         heading_rad = wrap_rad(odometry.yaw_rad + order.turn * math.radians(config.manual_turn_deg))
-        bounded_mps = _bound_speed(surge, inputs, odometry, fence, config)
+        bows_rad = (odometry.yaw_rad, heading_rad) if surge and order.turn else (odometry.yaw_rad,)
+        bounded_mps = _bound_speed(surge, bows_rad, inputs, odometry, fence, config)
         if bounded_mps is None:
             inhibits.append(Inhibit.OUTSIDE_FENCE)
         speed_mps = bounded_mps or 0.0
@@ -222,14 +223,24 @@ def _find_vetoes(inputs: NavigatorInputs, inhibits: list[Inhibit]) -> list[Inhib
 
 
 def _bound_speed(
-    surge: float, inputs: NavigatorInputs, odometry: Odometry, fence: Fence, config: NavigatorConfig
+    surge: float,
+    bows_rad: tuple[float, ...],
+    inputs: NavigatorInputs,
+    odometry: Odometry,
+    fence: Fence,
+    config: NavigatorConfig,
 ) -> float | None:
-    """The speed ahead or astern that the hand gets [m/s]; None where the fence gives it none."""
-    course_rad = odometry.yaw_rad if surge >= 0.0 else wrap_rad(odometry.yaw_rad + math.pi)
-    wanted_mps = abs(surge) * config.cruise_mps
+    """The speed ahead or astern that the hand gets [m/s] with all these bows; None where the fence gives it none."""
+    speed_mps = abs(surge) * config.cruise_mps
     if surge > 0.0:
-        wanted_mps = min(wanted_mps, speed_limit_mps(inputs.advisory))
-    return limit_speed(fence, odometry, course_rad, wanted_mps, config, is_astern=surge < 0.0)
+        speed_mps = min(speed_mps, speed_limit_mps(inputs.advisory))
+    for bow_rad in bows_rad:
+        course_rad = bow_rad if surge >= 0.0 else wrap_rad(bow_rad + math.pi)
+        bounded_mps = limit_speed(fence, odometry, course_rad, speed_mps, config, is_astern=surge < 0.0)
+        if bounded_mps is None:
+            return None
+        speed_mps = bounded_mps
+    return speed_mps
 
 
 def _is_neutral(order: OperatorOrder) -> bool:

@@ -6,10 +6,12 @@ import math
 
 import msgspec
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from paani.messages import NavCommand, Odometry
 from tests.unit.paani_services.navigator.test_modes import fenced_pool, manual, step
-from tests.unit.paani_services.navigator.test_navigate import pose
+from tests.unit.paani_services.navigator.test_navigate import PAANI, pose
 
 
 def driven(x_m: float, surge: float, way_mps: float) -> NavCommand:
@@ -26,3 +28,17 @@ def test_astern_as_ahead(x_m: float, way_mps: float) -> None:
     ahead, astern = driven(x_m, 1.0, way_mps), driven(x_m, -1.0, way_mps)
     assert ahead.enable == astern.enable
     assert astern.astern_mps == pytest.approx(ahead.speed_mps, abs=1e-9)
+
+
+PLACES_M, STICK = st.floats(-4.9, 4.9), st.sampled_from([-1.0, -0.4, 0.4, 1.0])
+
+
+@given(PLACES_M, PLACES_M, st.floats(-math.pi, math.pi), STICK, STICK)
+def test_a_hand_that_turns_stops_before_the_edge_on_its_heading_too(
+    x_m: float, y_m: float, yaw_rad: float, surge: float, turn: float
+) -> None:
+    here = msgspec.structs.replace(pose(x_m, y_m, yaw_rad), surge_mps=0.0)
+    order = step(manual(surge, turn), odometry=here, mission=fenced_pool())[1]
+    way_m = (order.speed_mps - order.astern_mps) * PAANI.fence_stop_s
+    end_m = x_m + way_m * math.cos(order.heading_rad), y_m + way_m * math.sin(order.heading_rad)
+    assert max(map(abs, end_m)) <= 5.0
