@@ -19,15 +19,8 @@ NOWHERE = Facts()
 
 async def test_the_map_of_a_target_stays_that_in_which_it_was_placed(tmp_path: Path) -> None:
     orders, facts = Published(), [HERE]
-    console = Console(
-        Published(),
-        Published(),
-        orders,
-        Published(),
-        tmp_path,
-        ManualClock(),
-        lambda: facts[0],  # type: ignore[arg-type]
-    )
+    publishers = Published(), Published(), orders, Published()
+    console = Console(*publishers, tmp_path, ManualClock(), lambda: facts[0])  # type: ignore[arg-type]  # the bus's place
 
     async def map_after(mode: m.DriveMode | None, found: Facts, press: int = 0) -> tuple[float, float]:
         facts[0] = found
