@@ -22,8 +22,9 @@ UNREAD = 128 + 13  # as of what SIGPIPE ends: the reader of the output went away
 
 def main(argv: list[str] | None = None) -> int:
     """Exit codes: 0 done, 1 crash, 2 user's mistake (one line on standard error), 141 nobody reads the output."""
-    if sys.stdout is None:  # it was closed by whoever began this process
-        sys.stdout = Path(os.devnull).open("w", encoding="utf-8")  # noqa: SIM115  # as long as the process lives
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:  # it was closed by whoever began this process
+            setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115  # as long as it lives
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # as standard error: a name may be bytes that are no text
     arguments = sys.argv[1:] if argv is None else argv

@@ -7,7 +7,7 @@ Each function gives an argparse `type` for the option of that name ("" for a pos
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 from paani.errors import UserError
@@ -42,8 +42,25 @@ def output_folder(option: str) -> PathOf:
     return _checked(option, _output_folder_problem)
 
 
+def require_apart(written: Mapping[str, Path | None], read: Iterable[Path | None] = ()) -> None:
+    """Raises UserError for an option whose file another one writes as well, or that is read and would be lost.
+
+    written: the files by option. A pipe or a device may be named twice.
+    """
+    taken = {os.path.realpath(path): "is read, and would be lost" for path in read if path is not None}
+    for option, path in written.items():
+        if path is None or (path.exists() and not path.is_file()):
+            continue
+        place = os.path.realpath(path)
+        if place in taken:
+            raise UserError(f"{option} {path}: {taken[place]}")
+        taken[place] = f"is what {option} writes"
+
+
 def _checked(option: str, problem_of: Callable[[Path], str]) -> PathOf:
     def parse(text: str) -> Path:
+        if not text:  # Python takes it for the current folder
+            raise UserError(f"{option} '': names no file or folder".strip())
         path = Path(text)
         try:
             problem = problem_of(path)

@@ -41,6 +41,12 @@ def test_bench_eyes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert all(name in printed for name in names)
 
 
+def test_a_folder_is_no_picture_whatever_its_name(tmp_path: Path) -> None:
+    (tmp_path / "x.jpg").mkdir()
+    with pytest.raises(UserError, match=f"^--folder {tmp_path}: no pictures"):
+        main(["--folder", str(tmp_path)])
+
+
 def test_measured_runs_everything_in_turn() -> None:
     """Each round runs every step once, on the next picture; the first rounds do not count."""
     seen: list[tuple[str, int]] = []

@@ -124,8 +124,7 @@ def _held_out_pictures(arguments: argparse.Namespace) -> list[Path]:
     """Pictures of the held-out sequences, where there is a data folder."""
     if not arguments.data.is_dir():
         return []
-    names = [name for name in arguments.sources.split(",") if name]
-    samples = PictureSelection(arguments.data, names, arguments.rendered).samples
+    samples = PictureSelection(arguments.data, arguments.sources, arguments.rendered).samples
     return [sample.picture for sample in samples if sample.held_out]
 
 

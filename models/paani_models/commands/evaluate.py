@@ -13,7 +13,8 @@ import msgspec
 
 from paani.cluster import Workers, add_cluster_argument, open_workers
 from paani.errors import UserError
-from paani.option_paths import input_file, input_folder, output_file, output_folder
+from paani.idle_options import refuse_options
+from paani.option_paths import input_file, input_folder, output_file, output_folder, require_apart
 from paani.whole_file import write_json
 from paani_models.benchmarks.score_networks import score_lars, score_mods
 from paani_models.catalogue import Figure, load_catalogue, save_catalogue, verified_path
@@ -69,6 +70,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_cluster_argument(parser)
 
 
+def refuse_idle_options(parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> None:
+    """Raises UserError for an option that would be passed over."""
+    labelled = ("nets", "--json", "--html", "--cluster")
+    if arguments.lars or arguments.mods:
+        refuse_options(parser, arguments, (*labelled, "--record", "--faults"), "is not for --lars and --mods")
+        return
+    refuse_options(parser, arguments, ("--predictions",), "goes with --lars or --mods")
+    if arguments.faults:
+        refuse_options(parser, arguments, labelled, "is not for --faults")
+    require_apart({"--json": arguments.json, "--html": arguments.html})
+
+
 @dataclass(frozen=True)
 class ScoredPair:
     """Everything measured on labelled pictures, picture by picture."""
@@ -92,11 +105,17 @@ def run(arguments: argparse.Namespace, pictures: PictureSelection) -> int:
 
 def _measure(arguments: argparse.Namespace, pictures: PictureSelection, workers: Workers) -> None:
     catalogue = load_catalogue(arguments.weights)
-    for net in arguments.nets or [name for name in catalogue if is_scored(catalogue[name].classes)]:
+    nets = arguments.nets or [name for name in catalogue if is_scored(catalogue[name].classes)]
+    for net in nets:
         if net not in catalogue or not is_scored(catalogue[net].classes):
             raise UserError(f"{arguments.weights}: no segmenter or detector named {net!r}")
+    is_boxed = bool(pictures.boxed_samples(held_out=True))
+    compared = {net for net in nets if is_boxed and is_detector(catalogue[net].classes)}
+    if arguments.html and not compared:
+        raise UserError("--html: shows a detector's boxes, and none is scored on a picture with boxes")
+    for net in nets:
         _print_and_record(net, measure_network(net, arguments.weights, pictures, workers), arguments)
-        if is_detector(catalogue[net].classes) and pictures.boxed_samples(held_out=True):
+        if net in compared:
             compare_detectors(net, arguments.weights, pictures, arguments.html)
     if arguments.json:
         write_evaluation(arguments.json, score_pair(arguments.weights, pictures, workers).evaluation)

@@ -11,6 +11,8 @@ import sys
 from pathlib import Path
 
 from paani.errors import UserError
+from paani.idle_options import refuse_options
+from paani.option_numbers import quantity, whole_number
 from paani.option_paths import input_file, input_folder, output_folder
 from paani_models.catalogue import OTHER_SETS, WEIGHTS, load_catalogue, verified_path
 from paani_models.commands import engines as engine_command
@@ -19,7 +21,7 @@ from paani_models.commands import prepare as prepare_command
 from paani_models.commands import report as report_command
 from paani_models.commands import small_obstacles as small_obstacles_command
 from paani_models.commands import temperature as temperature_command
-from paani_models.datasets.selection import PictureSelection
+from paani_models.datasets.selection import PictureSelection, source_names
 from paani_models.datasets.sources import list_pictures_without_water
 from paani_models.engines.contract_check import infer_role, inspect_model
 from paani_models.report.manifest_figures import measure_detector, measure_segmenter
@@ -27,19 +29,46 @@ from paani_models.report.model_card import render_model_card
 
 DATA_VARIABLE = "PAANI_DATA"
 PAIR = ("segmenter", "detector")
+MAX_EPOCHS, MAX_BATCH, MAX_DRAWS = 9999, 4096, 100.0
+MAX_SEED = 2**63 - 1  # PyTorch takes no more
 TRAINABLE = ("segmenter", "paper-segmenter", "detector", "yolo11n", "gate")
+SEGMENTERS = ("segmenter", "paper-segmenter")
+OPTION_USERS = {
+    "--teacher": ("paper-segmenter",),
+    "--labels-from": (*SEGMENTERS, "gate"),
+    "--stage": SEGMENTERS,
+    "--epochs": ("detector", "yolo11n", "gate"),
+    "--batch": (*SEGMENTERS, "detector"),
+    "--blend": ("detector",),
+    "--mean-with": ("detector",),
+    "--draws": ("detector",),
+    "--size": ("detector",),
+    "--unchecked": ("gate",),
+    "--seed": (*SEGMENTERS, "detector", "gate"),
+    "--without": ("paper-segmenter",),
+}  # of `train`: which networks take an option that not all of them do
 
 
 def data_folder() -> Path:
-    """The folder of annotated pictures: $PAANI_DATA, or shared/data beside the checkout."""
+    """The folder of annotated pictures: $PAANI_DATA, or shared/data beside the checkout; it may be missing.
+
+    Raises UserError for a name that no folder can have.
+    """
     beside = Path(__file__).resolve().parents[4] / "shared" / "data"
-    return Path(os.environ.get(DATA_VARIABLE, beside))
+    folder = Path(os.environ.get(DATA_VARIABLE) or beside)
+    try:
+        folder.exists()
+    except OSError as error:
+        raise UserError(f"{DATA_VARIABLE} {folder}: {error.strerror}") from error
+    return folder
 
 
 def main(argv: list[str]) -> int:
     """Run one sub-command; 0 on success, 2 with one line on a user's mistake."""
-    arguments = _parser().parse_args(argv)
+    parser = _parser()
+    arguments = parser.parse_args(argv)
     try:
+        _refuse_idle_options(parser, arguments)
         if arguments.command == "check":
             return _check_file(arguments) if arguments.model else _check_weights(arguments.weights)
         if arguments.command == "card":
@@ -82,6 +111,23 @@ def main(argv: list[str]) -> int:
         return 130
 
 
+def _refuse_idle_options(parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> None:
+    """Raises UserError for an option that the sub-command, as it was called, would pass over."""
+    if arguments.command == "train":
+        idle = [name for name, nets in OPTION_USERS.items() if arguments.net not in nets]
+        refuse_options(parser, arguments, idle, f"{arguments.net} has no use for it")
+    elif arguments.command == "export" and arguments.untrained:
+        refuse_options(parser, arguments, ("--looks-at", "--mean-with", "--share"), "is of a checkpoint")
+    elif arguments.command == "check" and arguments.model is None:
+        refuse_options(parser, arguments, ("--role", "--score"), "is of a MODEL.onnx")
+    elif arguments.command == "check":
+        refuse_options(parser, arguments, ("--weights",), "is not for a MODEL.onnx")
+    elif arguments.command == "evaluate":
+        evaluate_command.refuse_idle_options(parser, arguments)
+    elif arguments.command == "prepare":
+        prepare_command.refuse_idle_options(parser, arguments)
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="paani models", description=__doc__)
     commands = parser.add_subparsers(dest="command", required=True)
@@ -120,12 +166,14 @@ def _parser() -> argparse.ArgumentParser:
         help="segmenter checkpoint that labels unsegmented pictures; for gate: ONNX file whose errors it learns",
     )
     train.add_argument("--stage", action="append", default=[], metavar="EPOCHSxHEIGHTxWIDTH", help="repeatable")
-    train.add_argument("--epochs", type=int, help="detector and gate only")
-    train.add_argument("--batch", type=int, help="detector and segmenters: pictures a step; 16 if not given")
-    train.add_argument("--peak-rate", type=float)
+    train.add_argument("--epochs", type=whole_number(1, MAX_EPOCHS), help="detector, yolo11n and gate")
+    train.add_argument(
+        "--batch", type=whole_number(1, MAX_BATCH), help="detector and segmenters: pictures a step; 16 if not given"
+    )
+    train.add_argument("--peak-rate", type=quantity("a rate", high=10.0))
     train.add_argument(
         "--blend",
-        type=float,
+        type=quantity("a share", high=1.0, with_low=True),
         metavar="SHARE",
         help="detector: learn from both off-the-shelf networks too, starting with this share of YOLOX-nano's weights;"
         " the first stages stay as they are above 0, and where they are YOLOX-nano's",
@@ -136,10 +184,18 @@ def _parser() -> argparse.ArgumentParser:
         metavar="FILE",
         help="detector: start from the mean of --start's weights and these",
     )
-    train.add_argument("--draws", type=float, default=1.0, metavar="SHARE", help="detector: of an epoch's pictures")
+    train.add_argument(
+        "--draws",
+        type=quantity("a share", high=MAX_DRAWS),
+        default=1.0,
+        metavar="SHARE",
+        help="detector: of an epoch's pictures",
+    )
     train.add_argument("--size", metavar="HEIGHTxWIDTH", help="detector: of its input; 320x416 if not given")
     train.add_argument("--unchecked", action="store_true", help="gate: also on the sequences that choose its threshold")
-    train.add_argument("--seed", type=int, metavar="N", help="detector, segmenters and gate; 42 if not given")
+    train.add_argument(
+        "--seed", type=whole_number(0, MAX_SEED), metavar="N", help="detector, segmenters and gate; 42 if not given"
+    )
     train.add_argument(
         "--without",
         action="append",
@@ -147,7 +203,7 @@ def _parser() -> argparse.ArgumentParser:
         choices=("flip", "jitter", "glare"),
         help="paper-segmenter: leave this augmentation out, to see what it is worth; repeatable",
     )
-    train.add_argument("--threads", type=int, default=2)
+    train.add_argument("--threads", type=whole_number(1, 64), default=2)
     export = commands.add_parser("export", help="checkpoint to ONNX, compared on real pictures")
     export.add_argument("net", choices=TRAINABLE)
     exported = export.add_mutually_exclusive_group(required=True)
@@ -162,7 +218,11 @@ def _parser() -> argparse.ArgumentParser:
         metavar="FILE",
         help="detector, gate: the mean of the checkpoint's weights and these",
     )
-    export.add_argument("--share", type=float, help="of --mean-with's weights in it; 0.5 if not given")
+    export.add_argument(
+        "--share",
+        type=quantity("a share", high=1.0, with_low=True),
+        help="of --mean-with's weights in it; 0.5 if not given",
+    )
     evaluate = commands.add_parser("evaluate", help="figures of the exported nets on held-out sequences")
     evaluate_command.add_arguments(evaluate)
     report = commands.add_parser("report", help="one page of tables, curves and pictures, outside the repository")
@@ -192,7 +252,7 @@ def _parser() -> argparse.ArgumentParser:
     quantise.add_argument(
         "--model", type=input_file("--model"), metavar="FILE", help="FP32 ONNX file; the shipped one if not given"
     )
-    quantise.add_argument("--out", type=output_folder("--out"), default=Path("runs/int8"), help="default: runs/int8")
+    quantise.add_argument("--out", type=output_folder("--out"), default="runs/int8", help="default: runs/int8")
     quantise.add_argument(
         "--calibrate",
         type=input_file("--calibrate"),
@@ -203,7 +263,9 @@ def _parser() -> argparse.ArgumentParser:
     measuring = (evaluate, report, temperature, small_obstacles, quantise, convert, bench)
     for command in (check, held_out, check_data, pack, train, export, *measuring):
         command.add_argument("--data", type=input_folder("--data"), default=data_folder())
-        command.add_argument("--sources", default="", help="comma-separated, or `open`; all if not given")
+        command.add_argument(
+            "--sources", type=source_names, default=[], help="comma-separated, or `open`; all if not given"
+        )
         command.add_argument("--rendered", type=input_folder("--rendered"), help="folder of rendered pictures")
     return parser
 
@@ -256,9 +318,8 @@ def _check_file(arguments: argparse.Namespace) -> int:
 
 
 def _select_pictures(arguments: argparse.Namespace) -> PictureSelection:
-    names = [name for name in arguments.sources.split(",") if name]
     strict = arguments.command == "prepare"
-    return PictureSelection(arguments.data, names, arguments.rendered, strict=strict)
+    return PictureSelection(arguments.data, arguments.sources, arguments.rendered, strict=strict)
 
 
 def _write_variants(weights: Path, out: Path) -> int:

@@ -7,8 +7,9 @@ import sys
 from pathlib import Path
 
 from paani.errors import UserError
+from paani.idle_options import refuse_options
 from paani.option_numbers import quantity
-from paani.option_paths import input_file, input_folder, output_file, output_folder
+from paani.option_paths import input_file, input_folder, output_file, output_folder, require_apart
 from paani_models.datasets import inventory, mastr1325, waterscenes
 from paani_models.datasets.manifest import count_boxes, format_counts_table
 from paani_models.datasets.pack import WEIGHTS_FOLDER, pack_bundle
@@ -40,6 +41,16 @@ def add_pack_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def refuse_idle_options(parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> None:
+    """Raises UserError for an option of another set."""
+    idle = {
+        "own": ("--raw", "--out", "--by", "--strict", "--missing-is-empty"),
+        "waterscenes": ("--manifest", "--by"),
+        "mastr1325": ("--manifest", "--strict", "--missing-is-empty"),
+    }
+    refuse_options(parser, arguments, idle[arguments.set], f"is not for the set `{arguments.set}`")
+
+
 def prepare_own(pictures: PictureSelection, manifest: Path | None) -> int:
     """Exit 0, or raise UserError."""
     inventory.check_own_pictures(pictures.samples, pictures.source_folder, manifest)
@@ -64,6 +75,7 @@ def prepare_public(arguments: argparse.Namespace) -> int:
 
 def make_bundle(arguments: argparse.Namespace, pictures: PictureSelection) -> int:
     """Exit 0, or raise UserError."""
+    require_apart({"--out": arguments.out}, arguments.start)
     packed = pack_bundle(
         arguments.out,
         pictures.samples,

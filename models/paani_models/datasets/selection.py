@@ -18,6 +18,14 @@ from paani_models.datasets.sources import (
 from paani_models.datasets.terms import OPEN, OPEN_TERMS, refusal_of_terms
 
 
+def source_names(text: str) -> list[str]:
+    """An argparse `type`: names separated by commas; none for all sources. Raises UserError for an empty one."""
+    names = text.split(",") if text else []
+    if "" in names:
+        raise UserError(f"--sources {text}: names of sources, separated by commas")
+    return names
+
+
 class PictureSelection:
     """The chosen sources below a data folder, and a folder of rendered pictures: as given, or that of a bundle.
 

@@ -25,6 +25,7 @@ from paani_models.training.training_state import (
     Prefetch,
     TrainingState,
     append_record,
+    count_steps,
     learning_rate,
     to_device,
     training_device,
@@ -131,7 +132,7 @@ class DetectorTraining:
     def _train_epoch(self) -> tuple[float, float]:
         recipe, state, epoch = self.recipe, self.state, self.state.epoch
         order = draw_epoch(self.train, recipe, epoch)
-        steps = len(order) // recipe.batch
+        steps = count_steps(len(order), recipe.batch)
         total = steps * recipe.epochs
 
         def make(index: int) -> Batch:

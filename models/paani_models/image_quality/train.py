@@ -28,7 +28,14 @@ from paani_models.image_quality.data import FaultLevel, Scene, Segment, measure_
 from paani_models.image_quality.draws import CLEAN, WITHOUT_WATER, FitnessExample, draw_epoch_plan, draw_example
 from paani_models.image_quality.network import ImageQualityNetwork, start_from_export, start_from_imagenet
 from paani_models.network_input import segmenter_input
-from paani_models.training.training_state import Prefetch, TrainingState, append_record, learning_rate, to_device
+from paani_models.training.training_state import (
+    Prefetch,
+    TrainingState,
+    append_record,
+    count_steps,
+    learning_rate,
+    to_device,
+)
 
 MEASURED_SCENES = 84  # pictures on which a fault level's mIoU is measured: exact to one or two points
 VALIDATION_LEVELS = 8  # fault levels shown of each validation scene
@@ -153,7 +160,7 @@ class ImageQualityTraining:
             len(self.scenes), self.errors.weights(), self.recipe.per_scene, np.random.default_rng([seed, 2, epoch])
         )
         size = self.recipe.batch
-        steps = len(rows) // size
+        steps = count_steps(len(rows), size)
 
         def batch(step: int) -> list[FitnessExample]:
             rng = np.random.default_rng([seed, 3, epoch, step])
@@ -174,7 +181,7 @@ class ImageQualityTraining:
             total += float(loss.detach())
             absolute_errors = (torch.sigmoid(logit.detach()) - target).abs().cpu().numpy()[:, 0]
             self.errors.update(np.array([one.content for one in examples]), absolute_errors)
-        return total / max(1, steps)
+        return total / steps
 
     @torch.no_grad()
     def _validate(self) -> dict[str, float]:

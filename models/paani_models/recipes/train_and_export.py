@@ -25,6 +25,7 @@ from paani_models.detector.paper_network import Yolo11n
 from paani_models.detector.shipped_network import FIRST_STAGES, Detector, load_yolox_weights
 from paani_models.detector.train import DetectorRecipe, DetectorTraining
 from paani_models.detector.train_paper_network import Yolo11nRecipe, Yolo11nTraining
+from paani_models.engines.onnx_file import read_onnx
 from paani_models.image_quality.network import ImageQualityNetwork, start_from_export
 from paani_models.image_quality.train import ImageQualityRecipe, ImageQualityTraining
 from paani_models.network_input import (
@@ -42,7 +43,7 @@ from paani_models.segmenter.paper_network import PaperSegmenter
 from paani_models.segmenter.pseudo_labels import pseudo_label_pictures
 from paani_models.segmenter.shipped_network import ShippedSegmenter, load_imagenet_encoder
 from paani_models.segmenter.train import PAPER_RECIPE, SegmenterRecipe, SegmenterTraining, cache_pictures
-from paani_models.training.training_state import Stage, load_averaged_weights, read_recipe
+from paani_models.training.training_state import Stage, load_averaged_weights, load_checkpoint, read_recipe
 
 IMAGENET_FILE = "_weights/mobilenetv2_1.0_imagenet_folded_fp16.npz"
 COCO_FILE = "_weights/yolox_nano_coco.onnx"
@@ -50,7 +51,7 @@ SHIPPED = [folder.resolve() for folder in (WEIGHTS, *OTHER_SETS.values())]
 PAPER_NETWORKS = ("paper-segmenter", "yolo11n")
 COMPARED_PICTURES = 8  # on which an exported network must agree with its checkpoint
 
-STAGE = re.compile(r"[0-9]{1,4}x[1-9][0-9]{0,3}x[1-9][0-9]{0,3}")
+STAGE = re.compile(r"[1-9][0-9]{0,3}x[1-9][0-9]{0,3}x[1-9][0-9]{0,3}")
 
 IMAGENET_RECIPE = SegmenterRecipe(stages=(Stage(12, 128, 160), Stage(12, 256, 320)), peak_rate=1e-3)
 
@@ -77,8 +78,14 @@ class TrainingOptions:
 
 
 def train_network(net: str, pictures: PictureSelection, options: TrainingOptions, threads: int) -> None:
-    """Train a network into `options.folder`, from its last finished epoch if there is one."""
+    """Train a network into `options.folder`, from its last finished epoch if there is one.
+
+    Raises UserError naming a file that cannot be read.
+    """
     torch.set_num_threads(threads)
+    for path in (options.start, options.teacher, options.labels_from, options.mean_with):
+        if path is not None:  # reading pictures takes minutes
+            (read_onnx if path.suffix == ".onnx" else load_checkpoint)(path)
     if net == "detector":
         _train_detector(pictures, options)
     elif net == "yolo11n":
@@ -115,7 +122,7 @@ def segmenter_recipe(net: str, options: TrainingOptions) -> SegmenterRecipe:
         recipe,
         stages=parse_stages(options.stages) or recipe.stages,
         peak_rate=options.peak_rate or recipe.peak_rate,
-        batch=_batch(options, recipe.batch),
+        batch=options.batch or recipe.batch,
         seed=recipe.seed if options.seed is None else options.seed,
         without=options.without,
     )
@@ -140,17 +147,11 @@ def detector_recipe(options: TrainingOptions) -> DetectorRecipe:
         recipe,
         epochs=options.epochs or recipe.epochs,
         peak_rate=options.peak_rate or recipe.peak_rate,
-        batch=_batch(options, recipe.batch),
+        batch=options.batch or recipe.batch,
         seed=recipe.seed if options.seed is None else options.seed,
         draws_frac=options.draws_frac,
         distilled=options.blend is not None,
     )
-
-
-def _batch(options: TrainingOptions, usual: int) -> int:
-    if options.batch is not None and options.batch < 1:
-        raise UserError(f"--batch: {options.batch} is less than 1")
-    return options.batch or usual
 
 
 def _train_segmenter(net: str, pictures: PictureSelection, options: TrainingOptions) -> None:
@@ -171,7 +172,9 @@ def _train_segmenter(net: str, pictures: PictureSelection, options: TrainingOpti
         cached = pseudo_label_pictures(labeller, cached, samples)
     training = SegmenterTraining(model, recipe, options.folder, cached, held_out, distillation)
     if options.start is not None and options.start.suffix == ".onnx":
-        resized = np.stack([np.asarray(cv2.resize(p.picture, SIZE_WH), np.uint8) for p in cached[:: len(cached) // 32]])
+        resized = np.stack(
+            [np.asarray(cv2.resize(p.picture, SIZE_WH), np.uint8) for p in cached[:: max(1, len(cached) // 32)]]
+        )
         load_exported(model, options.start, torch.from_numpy(segmenter_batch(resized)))
         training.state.average_from_model()
     elif options.start is not None:

@@ -39,6 +39,7 @@ from paani_models.training.training_state import (
     Stage,
     TrainingState,
     append_record,
+    count_steps,
     learning_rate,
     mixed_precision,
     stage_at_epoch,
@@ -172,7 +173,7 @@ class SegmenterTraining:
         recipe, state, epoch = self.recipe, self.state, self.state.epoch
         stage = stage_at_epoch(recipe.stages, epoch)
         order = draw_epoch(self.train, recipe, epoch)
-        steps = len(order) // recipe.batch
+        steps = count_steps(len(order), recipe.batch)
         total = steps * recipe.epochs
 
         def make(index: int) -> tuple[Tensor, Tensor]:

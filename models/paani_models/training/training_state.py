@@ -54,6 +54,13 @@ def learning_rate(peak: float, step: int, total_steps: int, warmup_steps: int, f
     return peak * (final_frac + (1.0 - final_frac) * 0.5 * (1.0 + math.cos(math.pi * min(1.0, progress))))
 
 
+def count_steps(drawn: int, batch: int) -> int:
+    """Whole batches in an epoch's pictures. Raises UserError where there is none, so that nothing would be learnt."""
+    if drawn < batch:
+        raise UserError(f"sources: {drawn} pictures an epoch, and a batch has {batch} (--sources, --batch)")
+    return drawn // batch
+
+
 class AveragedWeights:
     """Exponential moving average of a model's floating-point state; `model` is what is evaluated and exported."""
 

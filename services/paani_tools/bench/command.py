@@ -14,7 +14,7 @@ import msgspec
 from paani.cli import add_config_arguments, config_from
 from paani.errors import UserError
 from paani.option_numbers import seconds, whole_number
-from paani.option_paths import input_path, output_file
+from paani.option_paths import input_path, output_file, require_apart
 from paani.statistics.figure_table import FigureTable, installed_commands, installed_tables, table_text
 from paani.statistics.measured import Machine, Report, measure_tables
 from paani.whole_file import write_whole
@@ -94,6 +94,8 @@ def _main(argv: list[str]) -> int:
     recording.add_argument("--json", type=output_file("--json"), metavar="FILE", help="write the figures there too")
     add_config_arguments(recording)
     options = parser.parse_args(argv)
+    if options.json and options.what in {"judgement", "planner"}:
+        require_apart({"--json": options.json}, options.drive)
     return BENCHES[options.what](options)
 
 

@@ -12,7 +12,7 @@ from paani.cli import add_config_arguments, config_from
 from paani.config import CalibrationConfig
 from paani.errors import UserError
 from paani.option_numbers import quantity
-from paani.option_paths import input_path, output_file
+from paani.option_paths import input_path, output_file, require_apart
 from paani.whole_file import write_whole
 from paani_tools.calibrate.gather import collect_live, collect_recorded, waterline_observations
 from paani_tools.calibrate.mount import Mount, estimate_mount
@@ -31,6 +31,7 @@ def main(argv: list[str]) -> int:
         return int(importlib.import_module(COMMANDS[argv[0]]).main(argv[1:]))
     options = _parser().parse_args(argv)
     config = config_from(options)
+    require_apart({"--out": options.out}, (options.recording, options.config))
     if (options.recording is None) == (options.live is None):
         raise UserError("name a recording, or --live SECONDS")
     for name in ("hfov_deg", "height_m"):

@@ -17,7 +17,7 @@ from paani.undecodable import UNREADABLE
 
 SHIPPED = "claims.toml"
 IN_CHECKOUT = Path(__file__).parents[3] / "tests" / SHIPPED
-_ID = re.compile(r"([A-Z])(\d+)")
+_ID = re.compile(r"([A-Z])(\d{1,4})")
 
 State = Literal["proved", "improved", "exempt"]
 
@@ -98,7 +98,8 @@ def _ids(name: str, statements: tuple[Statement, ...]) -> set[str]:
     found = {each for each in known if each == first or (first.isalpha() and each.startswith(first))}
     start, end = _ID.fullmatch(first), _ID.fullmatch(last)
     if dash and start and end and start[1] == end[1]:
-        found = {f"{start[1]}{number}" for number in range(int(start[2]), int(end[2]) + 1)} & known
+        span = range(int(start[2]), int(end[2]) + 1)
+        found = {each for each in known if each.startswith(start[1]) and int(each.removeprefix(start[1])) in span}
     elif dash:
         found = set()
     if not found:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from paani.config import CorridorConfig
 from paani.errors import UserError
 from paani.logs.reader import Log, open_log
-from paani.option_paths import input_path, output_file
+from paani.option_paths import input_path, output_file, require_apart
 from paani.whole_file import write_whole
 from paani_tools.explain.moment import Moment, last_change_us, moment_at
 from paani_tools.explain.narrative import narrative_of
@@ -22,6 +22,7 @@ from paani_tools.look.annotate import annotate_picture
 from paani_tools.replay.compatibility import provenance_of
 
 DAY_US = 86_400_000_000
+PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg")
 
 
 def main(argv: list[str]) -> int:
@@ -36,7 +37,10 @@ def main(argv: list[str]) -> int:
         "--picture", type=output_file("--picture"), metavar="FILE", help="write the annotated picture (.png or .jpg)"
     )
     options = parser.parse_args(argv)
+    if options.picture is not None and options.picture.suffix.lower() not in PICTURE_SUFFIXES:
+        raise UserError(f"--picture {options.picture}: expected a .png or .jpg file")
     log = open_log(options.file)
+    require_apart({"--picture": options.picture}, log.files)
     config = provenance_of(log, force=True).config
     moment = moment_at(log, last_change_us(log) if options.at is None else time_us(options.at, log))
     sys.stdout.write(narrative_of(moment, config))
@@ -92,7 +96,5 @@ def _utc_us(text: str, log: Log) -> int:
 
 
 def _write(path: Path, picture: NDArray[np.uint8]) -> None:
-    if path.suffix.lower() not in {".png", ".jpg", ".jpeg"}:
-        raise UserError(f"--picture {path}: expected a .png or .jpg file")
     _, data = cv2.imencode(path.suffix.lower(), picture)
     write_whole(path, data.tobytes(), "--picture")

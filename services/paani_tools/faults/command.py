@@ -11,8 +11,9 @@ from paani.cli import add_config_arguments, config_from
 from paani.config import PerceptionConfig
 from paani.errors import UserError
 from paani.messages import UnusableCause
-from paani.option_paths import input_file, input_folder, output_file
-from paani.whole_file import indented_json, write_whole
+from paani.option_numbers import whole_number
+from paani.option_paths import input_file, input_folder, output_file, require_apart
+from paani.whole_file import write_json, write_whole
 from paani_services.perception.corridors import classify_cells
 from paani_services.perception.engine import load_network
 from paani_services.perception.fitness import load_fitness
@@ -64,12 +65,15 @@ def main(argv: list[str]) -> int:
     parser.add_argument(
         "--without-water", type=input_file("--without-water"), metavar="FILE", help="pictures listed here show no water"
     )
-    parser.add_argument("--scenes", type=int, default=16, help="segmented pictures per source (default: 16)")
-    parser.add_argument("--clean", type=int, default=200, help="pictures per source as they are (default: 200)")
+    parser.add_argument("--scenes", type=whole_number(), default=16, help="segmented pictures per source (default: 16)")
+    parser.add_argument(
+        "--clean", type=whole_number(0), default=200, help="pictures per source as they are (default: 200)"
+    )
     parser.add_argument("--json", type=output_file("--json"), metavar="FILE")
     parser.add_argument("--svg", type=output_file("--svg"), metavar="FILE", help="the curves")
     add_config_arguments(parser)
     options = parser.parse_args(argv)
+    require_apart({"--json": options.json, "--svg": options.svg}, (options.pictures, options.without_water))
     models = PictureModels(config_from(options).perception)
     folders = find_source_folders(options.data)
     only = _read_list("--pictures", options.pictures) if options.pictures else None
@@ -90,9 +94,10 @@ def main(argv: list[str]) -> int:
     sys.stderr.write("\r" + " " * 40 + "\r")
     report = FaultReport(sum_up(cells, clean), tuple(cells), clean, measure_clean("without_water", dry, models.judge))
     sys.stdout.write(format_table(report))
-    for path, data in ((options.json, indented_json(report)), (options.svg, draw_severity_curves(cells).encode())):
-        if path is not None:
-            write_whole(path, data)
+    if options.json is not None:
+        write_json(options.json, report, "--json")
+    if options.svg is not None:
+        write_whole(options.svg, draw_severity_curves(cells).encode(), "--svg")
     return 0
 
 

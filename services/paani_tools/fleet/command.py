@@ -12,6 +12,7 @@ import msgspec
 from paani.clock import MonotonicClock, WallClock
 from paani.config import BusConfig
 from paani.errors import UserError
+from paani.idle_options import refuse_options
 from paani.option_numbers import whole_number
 from paani.option_paths import input_file
 from paani_tools.fleet.fleet_file import read_fleet
@@ -26,7 +27,10 @@ POLL_S = 0.05
 
 def main(argv: list[str]) -> int:
     """Exit codes: 0 all vessels are live, or have latched the STOP; 1 one is or has not; 2 user's mistake."""
-    options = _parser().parse_args(argv)
+    parser = _parser()
+    options = parser.parse_args(argv)
+    if options.list or options.json or options.stop or options.stop_all:
+        refuse_options(parser, options, ("--port",), "is of the page, which is not served then")
     fleet = read_fleet(options.fleet)
     names = [config.vessel for config in fleet]
     for name in options.stop:

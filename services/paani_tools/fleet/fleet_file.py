@@ -44,7 +44,7 @@ def read_fleet(path: Path) -> tuple[BusConfig, ...]:
     credential is missing, out of date or readable by others.
     """
     try:
-        fleet = msgspec.convert(tomllib.loads(path.read_text(encoding="utf-8")), _FleetFile)
+        fleet = msgspec.convert(tomllib.loads(path.read_text(encoding="utf-8-sig")), _FleetFile)
     except OSError as error:
         raise UserError(f"{path}: {error.strerror}") from error
     except UNDECODABLE as error:

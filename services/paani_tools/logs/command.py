@@ -11,7 +11,7 @@ from paani.extras import require_modules
 from paani.logs.folder import recordings
 from paani.logs.reader import Log, Record, open_log
 from paani.logs.repair import repair
-from paani.option_paths import input_folder, input_path, output_file, output_folder
+from paani.option_paths import input_folder, input_path, output_file, output_folder, require_apart
 from paani.whole_file import json_line
 from paani_tools.logs.export import export_csv, export_geojson, export_gpx
 from paani_tools.logs.export_ros2 import export_ros2
@@ -56,22 +56,18 @@ def _repair(path: Path) -> int:
 
 
 def _export(options: argparse.Namespace) -> int:
-    wanted = [
-        (export, path)
-        for export, path in (
-            (export_csv, options.csv),
-            (export_geojson, options.geojson),
-            (export_gpx, options.gpx),
-            (export_ros2, options.ros2),
-        )
-        if path is not None
-    ]
+    exports = {"--csv": export_csv, "--geojson": export_geojson, "--gpx": export_gpx, "--ros2": export_ros2}
+    wanted = {option: path for option in exports if (path := getattr(options, option[2:])) is not None}
     if not wanted:
         raise UserError("logs export: say what to write: --csv DIR, --geojson FILE, --gpx FILE or --ros2 FILE")
+    require_apart(wanted)
+    for option, path in wanted.items():
+        if path.exists():
+            raise UserError(f"{option} {path}: already exists")
     log = open_log(options.path)
-    for export, path in wanted:
+    for option, path in wanted.items():
         with Progress(path.name) as progress:
-            summary = export(log, path, ReadProgress(log, progress))
+            summary = exports[option](log, path, ReadProgress(log, progress))
         sys.stdout.write(summary + "\n")
     for problem in log.problems:
         sys.stderr.write(f"{problem}\n")
@@ -85,6 +81,7 @@ def _view(options: argparse.Namespace) -> int:
     from paani_tools.logs.rerun_view import view_in_rerun  # noqa: PLC0415  # of an extra
 
     log = open_log(options.path)
+    require_apart({"--out": options.out}, log.files)
     with Progress("converting") as progress:
         summary = view_in_rerun(log, options.out, ReadProgress(log, progress))
     sys.stdout.write(summary + "\n")

@@ -77,8 +77,7 @@ def export_csv(log: Log, folder: Path, seen: OnRecord) -> str:
 
 
 def export_geojson(log: Log, path: Path, seen: OnRecord) -> str:
-    """The estimated track and the fixes, as lines with times. Raises UserError as `export_csv`."""
-    _require_new(path)
+    """The estimated track and the fixes, as lines with times. Raises UserError where the file cannot be written."""
     tracks = _tracks(log, seen)
     features = [
         {
@@ -96,8 +95,7 @@ def export_geojson(log: Log, path: Path, seen: OnRecord) -> str:
 
 
 def export_gpx(log: Log, path: Path, seen: OnRecord) -> str:
-    """The same as GPX tracks. Raises UserError as `export_csv`, and without gpxpy."""
-    _require_new(path)
+    """The same as GPX tracks. Raises UserError as `export_geojson`, and without gpxpy."""
     try:
         from gpxpy import gpx  # noqa: PLC0415  # only this export needs it
     except ImportError as error:
@@ -146,11 +144,6 @@ def _place(record: Record) -> Point | None:
 def _write(option: str, path: Path, data: bytes, tracks: dict[str, list[Point]]) -> str:
     write_whole(path, data, option)
     return f"{path}: " + ", ".join(f"{name} {len(points)} points" for name, points in tracks.items())
-
-
-def _require_new(path: Path) -> None:
-    if path.exists():
-        raise UserError(f"{path}: already exists")
 
 
 def _topics() -> tuple[keys.Topic[Any], ...]:

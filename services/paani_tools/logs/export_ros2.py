@@ -22,11 +22,9 @@ PICTURES = (keys.PICTURE.name, keys.PICTURE.name + HEADER)
 def export_ros2(log: Log, path: Path, seen: Callable[[Record], None]) -> str:
     """Returns a line that says what was written.
 
-    Raises UserError where the file is there already or cannot be written, where rosbags is not installed, and where the
-    recording has no settings, a vessel that ROS cannot name, or nothing that the port sends.
+    Raises UserError where the file cannot be written, where rosbags is not installed, and where the recording has no
+    settings, a vessel that ROS cannot name, or nothing that the port sends.
     """
-    if path.exists():
-        raise UserError(f"{OPTION} {path}: already exists")
     require_modules(f"paani logs export {OPTION}", "rosbags")
     from paani_services.ros2.recorded import RecordedDrive  # noqa: PLC0415  # only this export needs rosbags
     from paani_services.ros2.schemas import definition  # noqa: PLC0415

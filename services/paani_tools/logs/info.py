@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import bisect
 import datetime
-import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 
 import msgspec
@@ -17,8 +16,6 @@ from paani.logs.reader import Log, Record
 from paani.logs.repair import is_finished
 from paani.undecodable import UNDECODABLE
 
-DROPPED = re.compile(r"\bdropped=(\d+)")
-MISSING = re.compile(r"\bmissing=(\d+)")
 MIB = 2**20
 
 
@@ -97,7 +94,7 @@ def info_of(log: Log, seen: Callable[[Record], None] = lambda record: None) -> L
         if record.topic == keys.ADVISORY.name:
             directions.take(record.data)
     duration_s = sum(end_us - start_us for start_us, end_us in log.recordings) * 1e-6  # not what lies between them
-    lost = log.metadata_by_part("recorder")
+    dropped, missing = log.recorder_counts("dropped"), log.recorder_counts("missing")
     return LogInfo(
         path=str(log.path),
         files=len(log.files),
@@ -113,8 +110,8 @@ def info_of(log: Log, seen: Callable[[Record], None] = lambda record: None) -> L
                 messages=one.messages,
                 rate_hz=round(one.gaps * 1e6 / max(one.spoken_us, 1), 2),
                 gap_s=round(one.gap_us * 1e-6, 3),
-                dropped=_sum(DROPPED, lost, name),
-                missing=_sum(MISSING, lost, name),
+                dropped=dropped.get(name, 0),
+                missing=missing.get(name, 0),
             )
             for name, one in sorted(channels.items())
         ),
@@ -188,11 +185,6 @@ def _whole(path: Path) -> bool:
         return is_finished(path)
     except OSError:
         return False
-
-
-def _sum(pattern: re.Pattern[str], records: Iterable[dict[str, str]], topic: str) -> int:
-    texts = (record.get(topic, "") for record in records)
-    return sum(int(found[1]) for text in texts if (found := pattern.search(text)))
 
 
 def _versions(data: bytes | None) -> dict[str, str]:

@@ -3,6 +3,7 @@
 import argparse
 import itertools
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 
 import cv2
@@ -12,8 +13,9 @@ from paani.cli import add_config_arguments, config_from
 from paani.clock import stopwatch_ms
 from paani.errors import UserError
 from paani.messages import Detection, Direction, LaneRisk, Reason, Text, Unit, UnusableCause
-from paani.option_paths import input_path, output_file, output_folder
+from paani.option_paths import input_path, output_file, output_folder, require_apart
 from paani.whole_file import json_line, write_whole
+from paani_services.camera.picture_sources import list_pictures
 from paani_services.perception.pipeline import Perceiver
 from paani_tools.look.annotate import annotate_picture
 from paani_tools.look.contact_sheet import ContactSheet
@@ -22,6 +24,7 @@ from paani_tools.look.verdict import Verdict, judge_path
 EPOCHS_PER_PATH = 1_000_000
 DEFAULT_OUT = Path("runs/look")
 JPEG_QUALITY = 90
+ANNOTATED_SUFFIX = ".jpg"
 SHEET_SUFFIXES = (".jpg", ".jpeg", ".png")
 
 
@@ -52,13 +55,17 @@ def main(argv: list[str]) -> int:
     if options.sheet is not None and options.sheet.suffix.lower() not in SHEET_SUFFIXES:
         raise UserError(f"--sheet {options.sheet}: is not one of {', '.join(SHEET_SUFFIXES)}")
     out: Path | None = options.out or (None if options.json or options.sheet else DEFAULT_OUT)
+    read = [file for path in options.paths for file in (list_pictures(path) if path.is_dir() else [path])]
+    require_apart({"--sheet": options.sheet}, read)
     if out is not None:
-        _make(out)
+        _require_other_folder(out, read)
     sheet = ContactSheet()
     perceiver = Perceiver(config.perception, stopwatch_ms)
     taken: set[str] = set()
     count = 0
     try:
+        if out is not None:
+            _make(out)
         for index, path in enumerate(options.paths):
             for verdict in judge_path(path, index * EPOCHS_PER_PATH, perceiver, config):
                 count += 1
@@ -92,7 +99,7 @@ def file_name(name: str, taken: set[str]) -> str:
     is_frame = number.isdecimal() and bool(stem)
     base = Path(stem).stem + f"_{int(number):06d}" if is_frame else Path(name).stem
     for attempt in itertools.count(1):
-        candidate = f"{base}.jpg" if attempt == 1 else f"{base}_{attempt}.jpg"
+        candidate = f"{base}{ANNOTATED_SUFFIX}" if attempt == 1 else f"{base}_{attempt}{ANNOTATED_SUFFIX}"
         if candidate not in taken:
             taken.add(candidate)
             return candidate
@@ -154,12 +161,16 @@ def _make(folder: Path) -> None:
         raise UserError(f"--out {folder}: {error.strerror}") from error
 
 
+def _require_other_folder(out: Path, read: Iterable[Path]) -> None:
+    """Raises UserError where an annotated picture could take the place of one that is read."""
+    for file in read:
+        if file.suffix == ANNOTATED_SUFFIX and file.resolve().parent == out.resolve():
+            raise UserError(f"--out {out}: {file} is read from there, and would be lost")
+
+
 def _save(file: Path, picture: object) -> None:
     _, data = cv2.imencode(file.suffix, picture, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
-    try:
-        file.write_bytes(data.tobytes())
-    except OSError as error:
-        raise UserError(f"{file}: {error.strerror}") from error
+    write_whole(file, data.tobytes(), "--out")
 
 
 def _progress(text: str | None) -> None:

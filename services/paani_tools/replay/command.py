@@ -13,9 +13,10 @@ import tempfile
 from paani import keys
 from paani.config import Config, with_settings
 from paani.errors import UserError
+from paani.idle_options import refuse_options
 from paani.logs.reader import Log, open_log
 from paani.option_numbers import quantity
-from paani.option_paths import input_path, output_file
+from paani.option_paths import input_path, output_file, require_apart
 from paani.page_address import page_origin
 from paani.whole_file import write_json
 from paani_tools.progress import Progress
@@ -27,13 +28,24 @@ from paani_tools.replay.verify import ChangeReport, CheckReport, change_log, che
 ROUTER = "bus.router=tcp/127.0.0.1:7448"  # beside the live bus
 _SINCE_START = quantity("seconds since the start", with_low=True)
 LISTENING = ("bus.", "dashboard.")  # settings that matter to a republished drive
+DECIDING = ("--json", "--force", "--chain")
+REPUBLISHING = ("--speed", "--from", "--to", "--loop", "--only", "--commands", "--dashboard")
 
 
 def main(argv: list[str]) -> int:
     """Exit codes: 0 done (with `--check`: every decision is the same), 1 not the same, 2 user's mistake."""
-    options = _parser().parse_args(argv)
-    _require_meaning(options)
+    parser = _parser()
+    options = parser.parse_args(argv)
+    if options.check:
+        refuse_options(parser, options, REPUBLISHING, "republishes; --check decides")
+    else:
+        refuse_options(parser, options, DECIDING, "goes with --check")
+    if options.chain and not options.sets:
+        raise UserError("--chain: goes with --set, of which each service is given the consequences")
+    if options.to_s <= options.from_s:
+        raise UserError(f"--to {options.to_s:g}: is not after --from {options.from_s:g}")
     log = open_log(options.file)
+    require_apart({"--json": options.json}, log.files)
     provenance = provenance_of(log, force=options.force or not options.check)
     if not options.check:
         return _republish(log, provenance.config, options)
@@ -49,28 +61,10 @@ def main(argv: list[str]) -> int:
     return 1 if isinstance(report, CheckReport) and not report.is_exact else 0
 
 
-def _require_meaning(options: argparse.Namespace) -> None:
-    """Raises UserError for an option that would be passed over in silence."""
-    deciding = {"--json": options.json, "--force": options.force, "--chain": options.chain}
-    republishing = {
-        "--speed": options.speed != 1.0,
-        "--from": options.from_s > 0.0,
-        "--to": options.to_s < math.inf,
-        "--loop": options.loop,
-        "--only": options.only,
-        "--commands": options.commands,
-        "--dashboard": options.dashboard,
-    }
-    for name, value in (republishing if options.check else deciding).items():
-        if value:
-            raise UserError(f"{name}: {'republishes; --check decides' if options.check else 'goes with --check'}")
-    if options.chain and not options.sets:
-        raise UserError("--chain: goes with --set, of which each service is given the consequences")
-    if options.to_s <= options.from_s:
-        raise UserError(f"--to {options.to_s:g}: is not after --from {options.from_s:g}")
-
-
 def _republish(log: Log, recorded: Config, options: argparse.Namespace) -> int:
+    span_s = (log.end_us - log.start_us) * 1e-6
+    if options.from_s > span_s:
+        raise UserError(f"--from {options.from_s:g}: {log.path} ends after {span_s:.1f} s")
     for text in options.sets:
         if not text.startswith(LISTENING):
             raise UserError(f"--set {text}: a republished drive takes only bus and dashboard settings (see --check)")
@@ -91,7 +85,7 @@ def _republish(log: Log, recorded: Config, options: argparse.Namespace) -> int:
         bus = config.bus
         profile = "" if bus.graph is keys.Graph.SIMULATION else f" --profile {config.profile}"
         sys.stdout.write(
-            f"{len(topics)} topics of {(log.end_us - log.start_us) * 1e-6:.1f} s, vessel {bus.vessel}; listen with\n"
+            f"{len(topics)} topics of {span_s:.1f} s, vessel {bus.vessel}; listen with\n"
             f"  paani echo TOPIC --set bus.router={bus.router} --set bus.runtime_dir={bus.runtime_dir}"
             f" --set bus.vessel={bus.vessel}{profile}\n"
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import collections
 import hashlib
 from typing import Any
 
@@ -145,13 +146,7 @@ def services_in(log: Log) -> set[str]:
 
 def recording_facts(log: Log) -> RecordingFacts:
     """What the recording says of itself; lost is what was dropped or missing, in all parts together."""
-    lost: dict[str, int] = {}
-    for counts in log.metadata_by_part("recorder"):
-        for topic, text in counts.items():
-            for word in text.split():
-                name, _, number = word.partition("=")
-                if name in {"dropped", "missing"} and number.isdecimal():
-                    lost[topic] = lost.get(topic, 0) + int(number)
+    lost = collections.Counter(log.recorder_counts("dropped")) + collections.Counter(log.recorder_counts("missing"))
     return RecordingFacts(lost, log.recordings, {topic: _schema_of(log, topic) for topic in log.topics})
 
 

@@ -50,7 +50,9 @@ def main(argv: list[str]) -> int:
 def _convert(options: argparse.Namespace) -> None:
     where = str(options.source)
     line = read_route(options.source, where)
-    if options.origin is not None and line.origin_deg is None:
+    if options.origin is not None:
+        if line.origin_deg is not None:
+            raise UserError(f"--origin: {where} has its own ({_lat_lon(line.origin_deg)})")
         line = _with_origin(line, options.origin, where)
     if options.thin is not None:
         line = _simplify_route(line, options.thin, where)

@@ -11,7 +11,7 @@ from paani.clock import stopwatch_ms
 from paani.config import Config
 from paani.errors import UserError
 from paani.messages import Text
-from paani.option_paths import input_path, output_file
+from paani.option_paths import input_path, output_file, require_apart
 from paani.whole_file import write_json
 from paani_services.perception.pipeline import Perceiver
 from paani_tools.look.verdict import PRESENTATION_US, PRESENTATIONS, Verdict
@@ -53,6 +53,7 @@ def main(argv: list[str]) -> int:
         report = TrajectoriesReport(profile=config.profile, families=families(config))
         text = families_table(report.families)
     else:
+        require_apart({"--json": options.json}, (file for file, _ in stills_of(options.paths)))
         report = stills_report(options.paths, config)
         text = stills_table(report.rows, report.stale)
         for skipped in report.skipped:

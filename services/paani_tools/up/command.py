@@ -12,6 +12,7 @@ from pathlib import Path
 from paani.cli import add_config_arguments, config_from
 from paani.config import Config
 from paani.errors import UserError
+from paani.idle_options import refuse_options
 from paani.keys import PORTS, Graph
 from paani.option_numbers import seconds
 from paani.option_paths import input_file, output_file, output_folder
@@ -28,8 +29,10 @@ DOCTOR = "`paani doctor` says what this machine lacks"
 
 def main(argv: list[str]) -> int:
     """Exit codes: 0 it ran to its end, 1 a service could not be kept alive, 2 user's mistake."""
-    options = _parser().parse_args(argv)
+    parser = _parser()
+    options = parser.parse_args(argv)
     if options.prepare is not None:
+        refuse_options(parser, options, ("--for", "--summary"), "is not for --prepare, which starts nothing")
         asyncio.run(_prepare(options))
         return 0
     outcome = asyncio.run(_up(options))

@@ -184,7 +184,7 @@ def _suggestion(text: str, path: str) -> str:
 def _read_settings(file: Path) -> dict[str, object]:
     """TOML, or JSON as `encode_config` writes it where the file's name says so."""
     try:
-        text = file.read_text(encoding="utf-8")
+        text = file.read_text(encoding="utf-8-sig")  # what some editors write begins with a mark
         return msgspec.json.decode(text, type=dict[str, object]) if file.suffix == ".json" else tomllib.loads(text)
     except OSError as error:
         raise UserError(f"{file}: {error.strerror}") from error

@@ -19,7 +19,7 @@ from paani.topic_names import present_name
 
 SUFFIX = ".mcap"
 CONFIG_FILE = "config.json"
-MAX_DIGITS = 9  # of a format's number
+MAX_DIGITS = 9  # of a number that a recording states
 RECORDER = "recorder"  # the metadata record of what the recorder counted by topic
 
 
@@ -91,11 +91,17 @@ class Log:
 
     def metadata(self, name: str) -> dict[str, str]:
         """The metadata records of that name; a later part wins where a key repeats. Empty where there is none."""
-        return {key: value for record in self.metadata_by_part(name) for key, value in record.items()}
+        return {key: value for part in self._parts for key, value in part.metadata.get(name, {}).items()}
 
-    def metadata_by_part(self, name: str) -> tuple[dict[str, str], ...]:
-        """The metadata record of that name in each part that has one."""
-        return tuple(part.metadata[name] for part in self._parts if name in part.metadata)
+    def recorder_counts(self, word: str) -> dict[str, int]:
+        """What the recorder counted as `word` (`dropped`, `missing`) of each topic, in all parts together."""
+        counts: dict[str, int] = {}
+        for part in self._parts:
+            for topic, text in part.metadata.get(RECORDER, {}).items():
+                for name, _, number in (each.partition("=") for each in text.split()):
+                    if name == word and number.isdecimal() and len(number) <= MAX_DIGITS:
+                        counts[topic] = counts.get(topic, 0) + int(number)
+        return counts
 
     def records(
         self, topics: Iterable[str] | None = None, start_us: int | None = None, end_us: int | None = None

@@ -14,7 +14,7 @@ import msgspec
 
 from paani.clock import process_cpu_s, stopwatch_ms
 from paani.errors import UserError
-from paani.option_paths import output_file
+from paani.option_paths import output_file, require_apart
 from paani.statistics.charts import drawing, element, lines
 from paani.statistics.figure_table import Cell, FigureTable
 from paani.statistics.measured import measure_tables
@@ -64,6 +64,7 @@ def main(argv: list[str]) -> int:
         "--svg", type=output_file("--svg"), metavar="FILE", help="plot cost against actors and picture size there"
     )
     options = parser.parse_args(argv)
+    require_apart({"--json": options.json, "--svg": options.svg})
     names = options.only or list(parts)
     if options.svg and "cost" not in names:
         raise UserError("--svg needs the part cost")

@@ -15,14 +15,15 @@ from tqdm import tqdm
 
 from paani.cluster import add_cluster_argument, open_workers
 from paani.errors import UserError
+from paani.idle_options import refuse_options
 from paani.option_numbers import whole_number
-from paani.option_paths import output_file, output_folder
+from paani.option_paths import output_file, output_folder, require_apart
 from paani.statistics.figure_table import table_text
 from paani.whole_file import indented_json, write_json, write_whole
 from paani_sim.trials.checkout import LEDGER_NAME, find_checkout, resolve_commit
 from paani_sim.trials.conditions import SWEPT, parse_sweep
 from paani_sim.trials.drive_states import DriveOutcome
-from paani_sim.trials.fingerprint import FingerprintReader
+from paani_sim.trials.fingerprint import SCENARIO_SUFFIX, FingerprintReader
 from paani_sim.trials.ledger import Ledger
 from paani_sim.trials.policies import PEERS, Policy, load_policy_config
 from paani_sim.trials.result import SHOAL, TrialResult
@@ -38,16 +39,26 @@ from paani_sim.worlds.imazu import IMAZU_SCENARIOS
 from paani_sim.worlds.load import load_scenario
 from paani_sim.worlds.shallows import SHALLOWS
 
+WRITTEN = ("--json", "--svg", "--report", "--ledger", "--record")
+OF_SUITES = (
+    "--suite", "--seeds", "--ledger", "--policy", "--worlds", "--scenario", "--jobs", "--sweep", "--svg", "--cluster",
+    "--out", "--report",
+)  # fmt: skip
+
 
 def main(argv: list[str]) -> int:
     """Drive, score, print. Exit codes: 0 it ran, 1 a drive diverged or gave no result, 2 user's mistake, 130 Ctrl-C."""
-    options = _parser().parse_args(argv)
+    parser = _parser()
+    options = parser.parse_args(argv)
+    written = {name: getattr(options, name[2:]) for name in WRITTEN}
+    require_apart(written, [Path(name) for name in options.scenario if name.endswith(SCENARIO_SUFFIX)])
+    if options.one is not None:
+        refuse_options(parser, options, OF_SUITES, "is of suites; --one drives as it says itself")
+        return _run_one(options)
     if options.sweep and options.report:
         raise UserError("--report is not for --sweep (which has --json and --svg)")
     if options.svg and not options.sweep:
         raise UserError("--svg needs --sweep")
-    if options.one:
-        return _run_one(options)
     if options.record:
         raise UserError("--record needs --one")
     return _run_suite(options)
@@ -56,7 +67,11 @@ def main(argv: list[str]) -> int:
 def _run_suite(options: argparse.Namespace) -> int:
     choice, ledger = _open_ledger(options)
     cases = _list_suite_cases(options, choice)
-    out: Path = options.out or Path("runs") / f"trial-{options.suite}"
+    out: Path = options.out or output_folder("--out")(f"runs/trial-{options.suite}")
+    if options.report:
+        from paani_sim.trials.report import drives_folder  # noqa: PLC0415
+
+        output_folder("--report")(str(drives_folder(options.report)))
     reader = FingerprintReader(options.sets)
     for policy in options.policy:
         load_policy_config(policy, options.sets)
@@ -188,7 +203,7 @@ def _groundings(result: TrialResult) -> str:
 
 
 def _list_suite_cases(options: argparse.Namespace, choice: SeedChoice) -> list[TrialCase]:
-    worlds = options.scenario or options.worlds or list(SUITES[options.suite].worlds)
+    worlds = list(dict.fromkeys(options.scenario or options.worlds or SUITES[options.suite].worlds))
     known = (*DRAWN_WORLDS, *IMAZU_SCENARIOS)
     for world in worlds:
         if options.scenario and not is_fixed_scenario(world):
@@ -197,7 +212,7 @@ def _list_suite_cases(options: argparse.Namespace, choice: SeedChoice) -> list[T
             load_scenario(world)
         elif world not in known:
             raise UserError(f"--worlds {world}: no such world (have: {', '.join(DRAWN_WORLDS)})")
-    return list_cases(SUITES[options.suite], worlds, options.policy, choice, options.sweep)
+    return list_cases(SUITES[options.suite], worlds, dict.fromkeys(options.policy), choice, options.sweep)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -220,10 +235,11 @@ def _parser() -> argparse.ArgumentParser:
         default=[policy for policy in Policy if policy not in PEERS],
         help=f"who drives: {', '.join(Policy)} (default: all but the peers {', '.join(PEERS)})",
     )  # fmt: skip
-    parser.add_argument(
+    places = parser.add_mutually_exclusive_group()
+    places.add_argument(
         "--worlds", nargs="+", metavar="WORLD", help=f"of {', '.join(DRAWN_WORLDS)} (default: all but {SHALLOWS})"
     )
-    parser.add_argument("--scenario", nargs="+", default=[], metavar="NAME|FILE", help="instead of worlds")
+    places.add_argument("--scenario", nargs="+", default=[], metavar="NAME|FILE", help="instead of worlds")
     parser.add_argument(
         "--jobs", type=whole_number(), default=os.cpu_count() or 1, metavar="N", help="drives side by side"
     )

@@ -78,7 +78,7 @@ def describe_machine() -> str:
 def _checksum_scenario(file: Path) -> str:
     """Of a scenario's file and of those that it names."""
     try:
-        named = _read_named(tomllib.loads(file.read_text(encoding="utf-8")))
+        named = _read_named(tomllib.loads(file.read_text(encoding="utf-8-sig")))
     except UNREADABLE:
         named = b""  # loading it names the fault
     return _checksum(checksum_files([file]).encode() + named)

@@ -48,10 +48,15 @@ def write_report(
 
     Of validation seeds no drive is shown.
     """
-    folder = path.with_name(f"{path.stem}-drives")
+    folder = drives_folder(path)
     viewable = {case: result for case, result in results.items() if result.part is not SeedPart.VALIDATION}
     repeated = repeat_drives(select_worst_drives(viewable, WORST_COUNT), results, sets, folder, jobs)
     write_whole(path, render_page(summary, results, repeated, folder.name).encode(), "--report")
+
+
+def drives_folder(path: Path) -> Path:
+    """Of the recordings, beside the page."""
+    return path.with_name(f"{path.stem}-drives")
 
 
 def render_page(

@@ -16,6 +16,8 @@ from paani.errors import UserError
 VALIDATION_SEEDS = range(10_001, 20_000)
 FRESH_SEEDS = range(100_000_000, 1_000_000_000)  # as many digits as `random:WORLD:SEED` takes
 COUNT_SEPARATOR, COMMIT_SEPARATOR = ":", "@"
+MAX_SEED_DIGITS = 18
+MAX_SPAN = 100_000  # seeds of one call: more is a slip of the hand
 
 
 class SeedPart(StrEnum):
@@ -77,7 +79,7 @@ def parse_seeds(text: str) -> SeedChoice:
         return SeedChoice(span=_parse_span(text))
     part = SeedPart(name)
     number, at, commit = rest.partition(COMMIT_SEPARATOR)
-    is_counted = number.isdecimal() and 0 < int(number) < len(VALIDATION_SEEDS)
+    is_counted = _is_seed(number) and 0 < int(number) < len(VALIDATION_SEEDS)
     if part is SeedPart.FRESH:
         if not is_counted or not commit:
             raise UserError(f"--seeds {text}: is not fresh:N@COMMIT (HEAD is a commit)")
@@ -98,13 +100,19 @@ def list_seeds(choice: SeedChoice, suite_count: int) -> list[int]:
     return list(range(first, first + count))
 
 
+def _is_seed(text: str) -> bool:
+    return text.isdecimal() and len(text) <= MAX_SEED_DIGITS
+
+
 def _parse_span(text: str) -> tuple[int, int]:
     first, dots, last = text.partition("..")
-    if not (first.isdecimal() and (last.isdecimal() if dots else True)):
+    if not (_is_seed(first) and (_is_seed(last) if dots else True)):
         raise UserError(f"--seeds {text}: is none of A..B, development[:N], validation[:N], fresh:N@COMMIT")
     span = int(first), int(last or first)
     if span[0] > span[1]:
         raise UserError(f"--seeds {text}: is empty")
+    if span[1] - span[0] >= MAX_SPAN:
+        raise UserError(f"--seeds {text}: {span[1] - span[0] + 1} seeds (at most {MAX_SPAN})")
     for part in (VALIDATION_SEEDS, FRESH_SEEDS):
         if span[0] < part.stop and span[1] >= part.start:
             raise UserError(f"--seeds {text}: holds {part_of_seed(part.start)} seeds, which are asked for by that name")

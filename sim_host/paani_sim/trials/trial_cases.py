@@ -14,7 +14,7 @@ import numpy as np
 from paani.errors import UserError
 from paani_sim.trials.conditions import TRAFFIC, parse_setting, traffic_of, with_condition
 from paani_sim.trials.policies import Policy
-from paani_sim.trials.seed_parts import SeedChoice, list_seeds
+from paani_sim.trials.seed_parts import MAX_SEED_DIGITS, SeedChoice, list_seeds
 from paani_sim.worlds import WORLDS, Fault, FaultKind, Scenario
 from paani_sim.worlds.generate import DRAWN_WORLDS, draw_random_scenario
 from paani_sim.worlds.imazu import IMAZU_SCENARIOS
@@ -90,7 +90,6 @@ class TrialSuite(msgspec.Struct, frozen=True, kw_only=True):
     other_faults: int = 0
 
 
-MAX_SEED_DIGITS = 18
 SUITES = {
     "quick": TrialSuite(seed_count=2, paper_seed_stride=2),
     "standard": TrialSuite(seed_count=50, paper_seed_stride=10, camera_faults=3, other_faults=1),

@@ -14,6 +14,7 @@ from tqdm import tqdm
 from paani import keys
 from paani import messages as m
 from paani.arrays import U8
+from paani.whole_file import write_whole
 from paani_sim.trials.drive_recorder import DriveRecorder
 from paani_sim.trials.lockstep_bus import START_US
 from paani_sim.trials.policies import CAMERA_POLICIES
@@ -84,7 +85,7 @@ def _repeat_drive(case: TrialCase, before: TrialResult, sets: tuple[str, ...], f
         result, _ = run_trial(case, sets, tap=collector.record_message)
     strip = render_picture_strip(collector, find_worst_moment_s(result)) if case.policy in CAMERA_POLICIES else b""
     if strip:
-        (folder / f"{case.stem}.png").write_bytes(strip)
+        write_whole(folder / f"{case.stem}.png", strip, "--report")
     is_equal = msgspec.json.encode(result) == msgspec.json.encode(before)
     return RepeatedDrive(case=case, is_equal=is_equal, log=log.name, strip=strip)
 

@@ -111,7 +111,7 @@ def load_vessel(name: str) -> Vessel:
     else:
         raise UserError(f"plant.vessel: no vessel {name!r} (known: {', '.join(VESSELS)}; or a TOML file)")
     try:
-        return msgspec.convert(tomllib.loads(file.read_text(encoding="utf-8")), Vessel)
+        return msgspec.convert(tomllib.loads(file.read_text(encoding="utf-8-sig")), Vessel)
     except OSError as error:
         raise UserError(f"{file}: {error.strerror}") from error
     except UNDECODABLE as error:

@@ -2,6 +2,7 @@
 
 import argparse
 import os
+import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -22,7 +23,7 @@ from paani_sim.worlds.scenario import Scenario
 from paani_sim.worlds.waterway import SHOWN_SEED
 
 VIEW_PX = (480, 360)
-MAX_VIEW_PX = 2048
+MIN_VIEW_PX, MAX_VIEW_PX = 16, 2048
 
 
 def main(argv: list[str]) -> int:
@@ -117,11 +118,10 @@ def _dataset(options: argparse.Namespace) -> int:
 
 def size(text: str) -> tuple[int, int]:
     """Width and height [px]."""
-    width, _, height = text.partition("x")
-    sides = int(width), int(height)
-    if not all(16 <= side <= MAX_VIEW_PX for side in sides):
-        raise ValueError(text)
-    return sides
+    if not re.fullmatch("[0-9]{1,5}x[0-9]{1,5}", text):
+        raise argparse.ArgumentTypeError(f"'{text}' is not WIDTHxHEIGHT")
+    width, height = map(whole_number(MIN_VIEW_PX, MAX_VIEW_PX), text.split("x"))
+    return width, height
 
 
 def _parser() -> argparse.ArgumentParser:

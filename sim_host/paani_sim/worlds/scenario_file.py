@@ -180,7 +180,7 @@ def read_scenario_file(path: Path) -> ScenarioFile:
             data = stream.read(MAX_BYTES + 1)
         if len(data) > MAX_BYTES:
             raise UserError(f"scenario {path}: larger than {MAX_BYTES // 1024} KiB")
-        return msgspec.convert(tomllib.loads(data.decode("utf-8")), ScenarioFile)
+        return msgspec.convert(tomllib.loads(data.decode("utf-8-sig")), ScenarioFile)
     except OSError as error:
         raise UserError(f"scenario {path}: {error.strerror}") from error
     except UNDECODABLE as error:

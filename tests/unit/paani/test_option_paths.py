@@ -8,7 +8,15 @@ from pathlib import Path
 import pytest
 
 from paani.errors import UserError
-from paani.option_paths import PathOf, input_file, input_folder, input_path, output_file, output_folder
+from paani.option_paths import (
+    PathOf,
+    input_file,
+    input_folder,
+    input_path,
+    output_file,
+    output_folder,
+    require_apart,
+)
 
 
 @pytest.fixture(autouse=True)
@@ -73,3 +81,17 @@ def test_what_the_user_has_no_right_to_is_named_with_its_option(
     monkeypatch.setattr(os, "access", lambda path, mode: False)  # root, who may run this, has every right
     with pytest.raises(UserError, match=f"^{problem}$"):
         path_of(text)
+
+
+def test_what_is_read_or_written_by_another_option_is_not_written() -> None:
+    Path("link").symlink_to("file")
+    Path("folder/below").symlink_to("../new")
+    for written, read, problem in (
+        ({"--json": Path("file")}, [None, Path("folder/../file")], "--json file: is read, and would be lost"),
+        ({"--json": Path("link")}, [Path("file")], "--json link: is read, and would be lost"),
+        ({"--json": Path("new"), "--svg": Path("folder/below")}, [], "--svg folder/below: is what --json writes"),
+    ):
+        with pytest.raises(UserError, match=f"^{problem}$"):
+            require_apart(written, read)
+    require_apart({"--json": Path("new"), "--svg": Path("other"), "--out": None}, [Path("file"), None])
+    require_apart({"--json": Path(os.devnull), "--svg": Path(os.devnull)})

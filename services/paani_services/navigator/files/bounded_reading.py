@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import tomllib
 from pathlib import Path
 from typing import TypeVar
@@ -17,11 +18,11 @@ T = TypeVar("T")
 
 
 def read_bytes(path: Path, where: str) -> bytes:
-    """The whole file. Raises UserError where it cannot be read or is larger than `MAX_BYTES`."""
+    """The whole file, without a byte order mark of UTF-8. Raises UserError where it is unreadable or too large."""
     try:
         if path.stat().st_size > MAX_BYTES:
             raise UserError(f"{where}: larger than {MAX_BYTES >> 20} MiB")
-        return path.read_bytes()
+        return path.read_bytes().removeprefix(codecs.BOM_UTF8)
     except OSError as error:
         raise UserError(f"{where}: {error.strerror}") from error
 

@@ -66,7 +66,7 @@ def _import_gpxpy(where: str) -> ModuleType:
 
 def _read_text(path: Path, where: str) -> str:
     try:
-        text = read_bytes(path, where).decode("utf-8-sig")
+        text = read_bytes(path, where).decode()
     except UnicodeDecodeError as error:
         raise UserError(f"{where}: not UTF-8 text") from error
     if "<!DOCTYPE" in text or "<!ENTITY" in text:

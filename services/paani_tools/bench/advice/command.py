@@ -18,7 +18,7 @@ from paani.option_numbers import whole_number
 from paani.option_paths import input_folder, output_file
 from paani.statistics.figure_table import FigureTable, table_text
 from paani.whole_file import write_whole
-from paani_models.datasets.selection import PictureSelection
+from paani_models.datasets.selection import PictureSelection, source_names
 from paani_models.datasets.sources import RENDERED, Sample, read_boxes, read_mask
 from paani_services.camera.picture_sources import read_frames
 from paani_services.perception.pipeline import Perceiver
@@ -42,7 +42,7 @@ def main(argv: list[str]) -> int:
     """Judge every annotated picture of one side of the split and print the shares. Raises UserError."""
     options = _parser().parse_args(argv)
     config = config_from(options)
-    selection = PictureSelection(options.data, options.sources.split(",") if options.sources else [], None)
+    selection = PictureSelection(options.data, options.sources, None)
     pictures = by_picture(selection.samples, held_out=options.held_out)
     if not pictures:
         raise UserError(f"{options.data}: no annotated picture of a known source (data folders: `paani models --help`)")
@@ -136,7 +136,9 @@ def _parser() -> argparse.ArgumentParser:
         "or a vessel ahead, onto what is no water, and over open water. Folders are those of `paani models`.",
     )
     parser.add_argument("data", type=input_folder(), metavar="DATA", help="folder of annotated sources")
-    parser.add_argument("--sources", metavar="NAMES", help="some sources only, separated by commas")
+    parser.add_argument(
+        "--sources", type=source_names, default=[], metavar="NAMES", help="some sources only, separated by commas"
+    )
     parser.add_argument("--held-out", action="store_true", help="the held-out sequences, not those to develop on")
     parser.add_argument("--most", type=whole_number(), metavar="N", help="at most so many pictures of each source")
     parser.add_argument("--json", type=output_file("--json"), metavar="FILE", help="write each picture's advice there")

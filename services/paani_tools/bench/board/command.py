@@ -145,7 +145,7 @@ async def _until_signal(work: Callable[[], Awaitable[None]]) -> None:
 def _free_folder(out: Path | None, clock: Clock) -> Path:
     """Where to keep this run. Raises UserError for a folder that already keeps one."""
     moment = datetime.datetime.fromtimestamp(clock.now_us() * 1e-6, tz=datetime.UTC)
-    folder = out if out is not None else Path("runs") / f"board-{moment:%Y%m%dT%H%M%SZ}"
+    folder = out or output_folder("--out")(f"runs/board-{moment:%Y%m%dT%H%M%SZ}")
     if folder.is_dir() and any(folder.iterdir()):
         raise UserError(f"--out {folder}: not empty; every run is kept in a folder of its own")
     return folder
@@ -179,12 +179,14 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _url(text: str) -> str:
-    parts = urlsplit(text)
-    if parts.scheme != "http" or not parts.hostname or parts.path.strip("/") or parts.query:
-        raise argparse.ArgumentTypeError("an address such as http://127.0.0.1:8043")
-    return text.rstrip("/")
+    with contextlib.suppress(ValueError):  # of a port beyond 65535
+        parts = urlsplit(text)
+        if parts.scheme == "http" and parts.hostname and parts.port != 0 and not (parts.path.strip("/") or parts.query):
+            return text.rstrip("/")
+    raise argparse.ArgumentTypeError(f"'{text}': expected an address such as http://127.0.0.1:8043")
 
 
 def _pid(text: str) -> str:
-    input_folder("--cgroup-of")(f"/proc/{int(text)}")
-    return str(int(text))
+    number = whole_number()(text)
+    input_folder("--cgroup-of")(f"/proc/{number}")
+    return str(number)

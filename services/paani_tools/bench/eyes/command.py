@@ -152,7 +152,7 @@ def _read(folder: Path) -> list[U8]:
     """At most MAX_PICTURES pictures, evenly from the sorted ones. Raises UserError naming what cannot be read."""
     if not folder.is_dir():
         raise UserError(f"--folder {folder}: no such folder")
-    files = sorted(path for path in folder.iterdir() if path.suffix.lower() in SUFFIXES)
+    files = sorted(path for path in folder.iterdir() if path.suffix.lower() in SUFFIXES and path.is_file())
     if not files:
         raise UserError(f"--folder {folder}: no pictures ({', '.join(sorted(SUFFIXES))})")
     found = []

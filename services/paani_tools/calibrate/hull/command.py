@@ -2,11 +2,13 @@
 
 import argparse
 import sys
+from pathlib import Path
 
 from msgspec.structs import replace
 
 from paani.errors import UserError
-from paani.option_paths import input_path, output_file
+from paani.option_numbers import quantity
+from paani.option_paths import input_path, output_file, require_apart
 from paani.statistics.figure_table import FigureTable, table_text
 from paani.whole_file import write_whole
 from paani_sim.vessels import VESSELS, Vessel, load_vessel
@@ -40,6 +42,8 @@ def main(argv: list[str]) -> int:
     if options.settings is not None and options.out is None:
         raise UserError("--settings: names the vessel's file, so --out is needed too")
     vessel = _vessel(options)
+    written = {"--out": options.out, "--settings": options.settings}
+    require_apart(written, (options.recording, *((Path(options.vessel),) if options.vessel not in VESSELS else ())))
     found = identify(read_drive(options.recording), vessel, START_FORCE_N)
     sys.stdout.write(table_text(estimate_table(found, options.vessel)))
     if lacking := undetermined(found):
@@ -110,17 +114,13 @@ def _parser() -> argparse.ArgumentParser:
         help=f"mass, fans and added mass, which no drive tells apart: {', '.join(VESSELS)} or a TOML file",
     )
     parser.add_argument(
-        "--mass-kg", type=_mass, metavar="KG", help="the boat's mass as weighed (default: the vessel's)"
+        "--mass-kg",
+        type=quantity("kg", high=MAX_MASS_KG),
+        metavar="KG",
+        help="the boat's mass as weighed (default: the vessel's)",
     )
     parser.add_argument("--out", type=output_file("--out"), metavar="FILE", help="write the vessel here (TOML)")
     parser.add_argument(
         "--settings", type=output_file("--settings"), metavar="FILE", help="write settings that use it here (TOML)"
     )
     return parser
-
-
-def _mass(text: str) -> float:
-    value = float(text)
-    if not 0.0 < value < MAX_MASS_KG:
-        raise argparse.ArgumentTypeError(f"above 0, below {MAX_MASS_KG:g}")
-    return value

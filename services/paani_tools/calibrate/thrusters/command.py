@@ -12,7 +12,7 @@ from paani.clock import stopwatch_ms
 from paani.config import EscConfig, ThrustersConfig
 from paani.errors import UserError
 from paani.microcontroller.payloads import McuStatus
-from paani.option_paths import output_file
+from paani.option_paths import output_file, require_apart
 from paani.whole_file import write_whole
 from paani_tools.calibrate.thrusters.bench import FRAME_S, Bench, connected, holds_text, is_driven
 from paani_tools.calibrate.thrusters.ramp import DeadMan, Ramp, fit_esc, settings_toml
@@ -42,6 +42,7 @@ def main(argv: list[str]) -> int:
     """Exit codes: 0 written, 1 given up, 2 the user's mistake. Only a finished calibration writes the file."""
     options = _parser().parse_args(argv)
     settings = config_from(options).thrusters
+    require_apart({"--out": options.out}, (options.config,))
     if not settings.line:
         raise UserError("thrusters.line: not set (--set thrusters.line=serial:/dev/ttyACM1@115200)")
     sys.stdout.write(INTRODUCTION)

@@ -16,9 +16,9 @@ from paani.errors import UserError
 @contextlib.contextmanager
 def raw_keys() -> Iterator[asyncio.Queue[str]]:
     """The keys of standard input, until the end; Ctrl-C still interrupts. Raises UserError where it is no terminal."""
-    fd = sys.stdin.fileno()
-    if not os.isatty(fd):
+    if sys.stdin is None or not sys.stdin.isatty():
         raise UserError("paani calibrate thrusters needs a terminal: somebody holds a key while a thruster turns")
+    fd = sys.stdin.fileno()
     before, loop = termios.tcgetattr(fd), asyncio.get_running_loop()
     keys: asyncio.Queue[str] = asyncio.Queue()
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import math
 from collections.abc import Iterator
 from pathlib import Path
@@ -92,6 +93,13 @@ def test_the_water_of_an_ineligible_mask_loads_from_its_earlier_section(tmp_path
     file.write_text("[perception]\nfallback_non_water = 0.7\n")
     loaded = load_config(file=file, profile="paper", sets=["perception.fallback_uncertainty=0.2"])
     assert (loaded.advisor.fallback_non_water, loaded.advisor.fallback_uncertainty) == (0.7, 0.2)
+
+
+def test_a_file_may_begin_with_a_byte_order_mark_and_end_its_lines_as_windows_does(tmp_path: Path) -> None:
+    for name, data in (("a.toml", b"[camera]\r\nrate_hz = 5\r\n"), ("a.json", b'{"camera":\r\n{"rate_hz": 5}}')):
+        file = tmp_path / name
+        file.write_bytes(codecs.BOM_UTF8 + data)
+        assert load_config(file=file).camera.rate_hz == 5.0
 
 
 @pytest.mark.parametrize("content", ["[camera", "\x00", "camera = 3"])

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from paani.cli import main as paani
 from paani.errors import UserError
 from paani_models.commands.models import data_folder, main
 from paani_models.datasets.selection import PictureSelection
@@ -96,6 +97,18 @@ def test_unknown_source_and_missing_manifest_are_one_line(tmp_path: Path) -> Non
         choose_sources(["nowhere"])
     with pytest.raises(UserError, match=r"tbiseg_dasha.manifest\.json"):
         read_samples(tmp_path, choose_sources(["tbiseg_dasha"]))
+
+
+def test_a_name_that_no_folder_can_have_is_refused_with_its_variable(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("PAANI_DATA", "n" * 300)
+    assert paani(["models", "held-out"]) == 2
+    assert capsys.readouterr().err == f"paani: PAANI_DATA {'n' * 300}: File name too long\n"
+    monkeypatch.setenv("PAANI_DATA", "")
+    unset = data_folder()
+    monkeypatch.delenv("PAANI_DATA")
+    assert unset == data_folder()
 
 
 @pytest.mark.data

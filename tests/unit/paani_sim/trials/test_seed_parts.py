@@ -82,6 +82,10 @@ def test_a_choice_names_its_seeds(text: str, expected: list[int]) -> None:
         ("development:", "is not development"),
         (f"1..{VALIDATION_SEEDS.start}", "holds validation seeds"),
         (f"{FRESH_SEEDS.start + 5}", "holds fresh seeds"),
+        ("2000000000..99999999999", r"seeds \(at most 100000\)"),
+        ("20000..120000", "100001 seeds"),
+        ("9" * 19, "is none of"),
+        (f"fresh:{'9' * 5000}@HEAD", "is not fresh:N@COMMIT"),
     ],
 )
 def test_what_is_no_choice_is_refused(text: str, says: str) -> None:

@@ -237,16 +237,22 @@ def test_figures_of_people_and_of_several_parts_say_so() -> None:
         (["--json", "/nowhere/at/all.json"], "no such folder"),
         (["--report", "/nowhere/at/all.html"], "no such folder"),
         (["--one", "lake:1:paani", "--record", "/nowhere/a.mcap"], "no such folder"),
+        (["--one", "lake:1:blind"], "--out: is of suites"),
+        (["--one", "lake:1:blind", "--seeds", "1..4"], "--seeds: is of suites"),
+        (["--one", "lake:1:blind", "--suite", "imazu"], "--suite: is of suites"),
+        (["--policy", "blind", "--report", "taken.html"], "--report .*taken-drives is a file, not a folder"),
     ],
 )
 @pytest.mark.slow
-def test_mistakes_are_named(words: list[str], says: str, tmp_path: Path) -> None:
+def test_mistakes_are_named(words: list[str], says: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("taken-drives").touch()
     with pytest.raises(UserError, match=says):
         command.main([*words, "--out", str(tmp_path / "run")])
     assert not (tmp_path / "run").exists()
 
 
-@pytest.mark.parametrize("words", [["--jobs", "0"], ["--policy", "me"]])
+@pytest.mark.parametrize("words", [["--jobs", "0"], ["--policy", "me"], ["--worlds", "lake", "--scenario", "imazu-01"]])
 def test_malformed_options_are_refused(words: list[str]) -> None:
     with pytest.raises(SystemExit) as stop:
         command.main(words)

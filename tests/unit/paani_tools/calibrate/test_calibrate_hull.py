@@ -185,6 +185,7 @@ def test_a_fix_far_off_is_left_out(rich: Messages) -> None:
         (("{log}", "--vessel", "nobody"), "no vessel 'nobody'"),
         (("{log}", "--vessel", "paper", "--settings", "s.toml"), "--out is needed too"),
         (("{log}", "--vessel", "paper", "--mass-kg", "-1"), "--mass-kg"),
+        (("{log}", "--vessel", "paper", "--mass-kg", "heavy"), "argument --mass-kg: 'heavy' is no number"),
         (("{log}", "--vessel", "paper"), "no plant/thrust_applied in it"),
     ],
 )

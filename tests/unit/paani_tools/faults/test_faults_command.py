@@ -85,6 +85,14 @@ def test_mistakes_are_named(corpus: Path, what: str, capsys: pytest.CaptureFixtu
     assert str(corpus) in error
 
 
+@pytest.mark.parametrize("option", ["--scenes=0", "--clean=-1", "--scenes=many"])
+def test_impossible_numbers_are_refused(option: str, corpus: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stop:
+        main(["faults", str(corpus), option])
+    assert stop.value.code == 2
+    assert f"argument {option.partition('=')[0]}: " in capsys.readouterr().err
+
+
 def test_totals_are_shares_of_settled_cells() -> None:
     cells = (
         LevelFigures("rain", 1, 10, 0.9, 1),  # must be accepted, one refused

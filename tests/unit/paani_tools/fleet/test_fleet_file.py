@@ -42,6 +42,17 @@ def test_a_vessel_is_joined_by_its_own_credential(fleet: Path) -> None:
     assert (bus.vessel, bus.router, bus.runtime_dir) == ("otter", "tcp/10.0.0.2:7450", str(fleet.parent / "otter"))
 
 
+def test_the_file_may_begin_with_a_byte_order_mark(fleet: Path) -> None:
+    fleet.write_text(OTTER, encoding="utf-8-sig")
+    assert len(read_fleet(fleet)) == 1
+
+
+@pytest.mark.parametrize("act", [["--list"], ["--stop-all"]])
+def test_a_port_is_of_the_page_alone(act: list[str], fleet: Path) -> None:
+    with pytest.raises(UserError, match=r"^--port: is of the page"):
+        main([str(fleet), "--port", "1", *act])
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [

@@ -17,7 +17,8 @@ from paani.cli import main
 from paani.logs.reader import open_log
 from paani.logs.writer import LogWriter
 from paani_tools.logs.info import DirectionChanges
-from tests.unit.paani.logs.small_logs import NAME, START_US, about, finished, put, unfinished
+from paani_tools.replay.verify import recording_facts
+from tests.unit.paani.logs.small_logs import NAME, START_US, about, begin, fill, finished, put, unfinished
 
 ONE = "20231114T221320Z-1.mcap"
 
@@ -47,6 +48,19 @@ def test_info_tells_what_is_in_it(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert info["start_us"] == START_US
     assert info["direction_changes_per_min"] is None
     assert {topic["topic"]: topic["messages"] for topic in info["topics"]}["camera/picture"] == 12
+
+
+@pytest.mark.slow
+def test_counts_of_a_recorder_are_added_up_and_none_is_absurd(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for number, counts in enumerate(("dropped=3 missing=1", f"missing=2 dropped={'9' * 5000} dropped=-4 x dropped=")):
+        log = begin(tmp_path, f"{number}.mcap")
+        fill(log, 10, 10)
+        log.finish({"localization/odometry": counts})
+    [line] = [line for line in output_of(capsys, "info", tmp_path).splitlines() if line.startswith("localization/")]
+    assert line.split()[-2:] == ["3", "3"]
+    assert recording_facts(open_log(tmp_path)).lost == {"localization/odometry": 6}
 
 
 def test_changes_of_direction_are_counted() -> None:

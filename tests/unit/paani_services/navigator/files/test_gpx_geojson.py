@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import itertools
 import math
 import sys
@@ -238,6 +239,19 @@ def test_an_origin_far_from_the_route_is_named(
         f"paani: --origin {float(origin.split(',', 1)[0]):.7f}, 10.0000000: {path}: "
     )
     assert not out.exists()
+
+
+def test_a_file_may_begin_with_a_byte_order_mark(tmp_path: Path) -> None:
+    for name, text in (("a.gpx", GPX), ("a.geojson", GEOJSON), ("a.toml", TOML)):
+        line = read_route(written(tmp_path, name, codecs.BOM_UTF8 + text.encode()), "test")
+        assert line == read_route(written(tmp_path, name, text), "test")
+
+
+def test_a_route_with_an_origin_takes_no_other(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = written(tmp_path, "a.toml", f"{TOML}[origin]\nlatitude_deg = 47\nlongitude_deg = 9\n")
+    assert paani(["route", "convert", str(path), str(tmp_path / "b.gpx"), "--origin", "47.65,9.48"]) == 2
+    assert capsys.readouterr().err == f"paani: --origin: {path} has its own (47.0000000, 9.0000000)\n"
+    assert not (tmp_path / "b.gpx").exists()
 
 
 def test_a_route_across_the_180th_meridian_is_read_again(tmp_path: Path) -> None:
