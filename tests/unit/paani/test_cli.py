@@ -53,7 +53,8 @@ def test_a_closed_output_and_a_name_of_bytes_are_no_crash(tmp_path: Path) -> Non
     done = run_in_shell(f"$PAANI logs info {NAME} >&-", tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     assert run_in_shell("$PAANI nothing 2>&-", tmp_path).returncode == 2
-    done = run_in_shell("$PAANI calibrate thrusters --out x --set thrusters.line=serial:/dev/ttyACM1@115200 <&-", tmp_path)
+    line = "thrusters.line=serial:/dev/ttyACM1@115200"
+    done = run_in_shell(f"$PAANI calibrate thrusters --out x --set {line} <&-", tmp_path)
     assert (done.returncode, done.stderr.count("\n"), "needs a terminal" in done.stderr) == (2, 1, True)
     done = run_in_shell(f"mv {NAME} $'n\\xff.mcap' && $PAANI logs info --json $'n\\xff.mcap'", tmp_path)
     assert done.returncode == 0

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import cv2
 import msgspec
@@ -183,7 +184,7 @@ def test_a_few_pictures_suffice_to_begin_from_an_exported_segmenter(
     monkeypatch.setattr(train_and_export, "cache_pictures", lambda samples: river)
     monkeypatch.setattr(train_and_export, "load_exported", lambda model, path, batch: seen.append(len(batch)))
     monkeypatch.setattr(SegmenterTraining, "run", lambda training: None)
-    pictures = SimpleNamespace(data=tmp_path, segmented_samples=lambda *, held_out: [])
+    pictures: Any = SimpleNamespace(data=tmp_path, segmented_samples=lambda *, held_out: [])
     options = TrainingOptions(tmp_path / "run", start=verified_path("segmenter"))
     train_and_export.train_network("paper-segmenter", pictures, options, 1)
     assert seen == [6]
