@@ -15,7 +15,7 @@ import msgspec
 from paani.cli import add_config_arguments, config_from
 from paani.clock import MonotonicClock
 from paani.config import Config
-from paani.option_numbers import seconds
+from paani.option_numbers import quantity
 from paani.option_paths import output_file
 from paani.runtime import runtime_dir
 from paani.whole_file import write_json
@@ -25,6 +25,7 @@ from paani_tools.up.plan import make_plan
 from paani_tools.up.terminal import Display
 
 CLOCK = MonotonicClock()
+LEAST_S = 10.0  # of a run: of less there are too few samples to see a slope
 SAMPLE_S = 5.0
 WARM_UP = 0.2  # of the run, at most ten minutes: caches fill, and the C library finds its size
 WARM_UP_MAX_S = 600.0
@@ -78,6 +79,7 @@ def main(argv: list[str]) -> int:
     """Exit codes: 0 every bar was kept, 1 one was not or a process was started again, 2 user's mistake."""
     parser = argparse.ArgumentParser(prog="paani bench soak", description="A long drive, and what it takes.")
     parser.add_argument("--world", help="a world or a scenario (default: river)")
+    seconds = quantity("seconds", LEAST_S, with_low=True)
     parser.add_argument("--for", dest="seconds", type=seconds, default=3600.0, metavar="S", help="default: 3600")
     parser.add_argument("--json", type=output_file("--json"), metavar="FILE", help="write the figures there too")
     add_config_arguments(parser)

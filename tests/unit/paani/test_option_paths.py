@@ -58,6 +58,8 @@ def test_what_can_be_used_is_a_path(path_of: PathOf, text: str) -> None:
         (output_folder("--out"), "file", "--out file: .*file is a file, not a folder"),
         (output_folder("--out"), "file/new", "--out file/new: .*file is a file, not a folder"),
         (output_file("--out"), "n" * 300, "--out n+: File name too long"),
+        (input_path(), "", "'': names no file or folder"),
+        (output_folder("--out"), "", "--out '': names no file or folder"),
     ],
 )
 def test_what_cannot_be_used_is_named_with_its_option(path_of: PathOf, text: str, problem: str) -> None:

@@ -18,7 +18,7 @@ def _folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "message"),
     [
         (["train", "segmenter", "--epochs", "3"], "--epochs: segmenter has no use for it"),
         (["train", "segmenter", "--teacher", "file"], "--teacher: segmenter has no use for it"),
@@ -37,10 +37,10 @@ def _folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     ],
 )
 def test_an_option_that_would_be_passed_over_is_refused(
-    words: list[str], told: str, capsys: pytest.CaptureFixture[str]
+    words: list[str], message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main([*words, *(["--folder", "run"] if words[0] == "train" else [])]) == 2
-    assert capsys.readouterr().err == f"paani models: {told}\n"
+    assert capsys.readouterr().err == f"paani models: {message}\n"
     assert sorted(path.name for path in Path().iterdir()) == ["file", "folder"]
 
 

@@ -26,7 +26,7 @@ def _folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "message"),
     [
         (["replay", "drive.mcap", "--check", "--json", "drive.mcap"], "--json drive.mcap: is read"),
         (["replay", ".", "--check", "--json", "drive.mcap"], "--json drive.mcap: is read"),
@@ -62,11 +62,11 @@ def _folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     ids=lambda value: " ".join(value[:2]) if isinstance(value, list) else None,
 )
 @pytest.mark.slow
-def test_a_file_is_not_written_over_another(words: list[str], told: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_file_is_not_written_over_another(words: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
     before = {path: path.read_bytes() if path.is_file() else b"" for path in Path().rglob("*")}
     assert main(words) == 2
     out, errors = capsys.readouterr()
     assert out == ""
-    assert told in errors
+    assert message in errors
     assert len(errors.splitlines()) == 1
     assert {path: path.read_bytes() if path.is_file() else b"" for path in Path().rglob("*")} == before

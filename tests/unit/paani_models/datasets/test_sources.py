@@ -8,7 +8,7 @@ import pytest
 from paani.cli import main as paani
 from paani.errors import UserError
 from paani_models.commands.models import data_folder, main
-from paani_models.datasets.selection import PictureSelection
+from paani_models.datasets.selection import PictureSelection, source_names
 from paani_models.datasets.sources import (
     ANNOTATIONS,
     DETECTOR_CLASSES,
@@ -97,6 +97,13 @@ def test_unknown_source_and_missing_manifest_are_one_line(tmp_path: Path) -> Non
         choose_sources(["nowhere"])
     with pytest.raises(UserError, match=r"tbiseg_dasha.manifest\.json"):
         read_samples(tmp_path, choose_sources(["tbiseg_dasha"]))
+
+
+@pytest.mark.parametrize("text", [",", "oasis,", ",oasis"])
+def test_an_empty_name_is_not_every_source(text: str) -> None:
+    with pytest.raises(UserError, match=f"^--sources {text}: names of sources"):
+        source_names(text)
+    assert (source_names(""), source_names("oasis,open")) == ([], ["oasis", "open"])
 
 
 def test_a_name_that_no_folder_can_have_is_refused_with_its_variable(

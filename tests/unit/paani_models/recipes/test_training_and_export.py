@@ -2,8 +2,6 @@
 
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import cv2
 import msgspec
@@ -21,7 +19,6 @@ from paani_models.detector.data import BoxedPicture  # noqa: E402
 from paani_models.detector.paper_network import Yolo11n  # noqa: E402
 from paani_models.detector.shipped_network import Detector  # noqa: E402
 from paani_models.network_input import SIZE_WH, detector_input, segmenter_batch, segmenter_input  # noqa: E402
-from paani_models.recipes import train_and_export  # noqa: E402
 from paani_models.recipes.onnx_export import (  # noqa: E402
     CONTRACTS,
     SmallerInside,
@@ -167,27 +164,6 @@ def test_another_recipe_does_not_resume(tmp_path: Path, river: list[CachedPictur
     other = SegmenterTraining(PaperSegmenter(), replace(SMALL, peak_rate=0.5), tmp_path, river, river)
     with pytest.raises(UserError, match=r"last\.pt: was made with another recipe"):
         other.run()
-
-
-def test_an_epoch_of_less_than_a_batch_is_refused(tmp_path: Path, river: list[CachedPicture]) -> None:
-    recipe = replace(segmenter_train.PAPER_RECIPE, stages=(Stage(1, 64, 64),), batch=7)
-    training = SegmenterTraining(PaperSegmenter(), recipe, tmp_path, river, river[:2])
-    with pytest.raises(UserError, match=r"^sources: 6 pictures an epoch, and a batch has 7"):
-        training.run()
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_few_pictures_suffice_to_begin_from_an_exported_segmenter(
-    tmp_path: Path, river: list[CachedPicture], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    seen: list[int] = []
-    monkeypatch.setattr(train_and_export, "cache_pictures", lambda samples: river)
-    monkeypatch.setattr(train_and_export, "load_exported", lambda model, path, batch: seen.append(len(batch)))
-    monkeypatch.setattr(SegmenterTraining, "run", lambda training: None)
-    pictures: Any = SimpleNamespace(data=tmp_path, segmented_samples=lambda *, held_out: [])
-    options = TrainingOptions(tmp_path / "run", start=verified_path("segmenter"))
-    train_and_export.train_network("paper-segmenter", pictures, options, 1)
-    assert seen == [6]
 
 
 def test_a_training_takes_its_batch_and_seed_from_the_options(tmp_path: Path) -> None:

@@ -13,6 +13,8 @@ import pytest
 
 torch = pytest.importorskip("torch", reason="needs the extra paani[train]")
 
+from paani.errors import UserError  # noqa: E402
+from paani_models.catalogue import verified_path  # noqa: E402
 from paani_models.recipes import train_and_export  # noqa: E402
 from paani_models.recipes.train_and_export import TrainingOptions, segmenter_recipe  # noqa: E402
 from paani_models.segmenter import train  # noqa: E402
@@ -111,3 +113,35 @@ def test_z4_the_seed_asked_for_draws_the_first_weights(tmp_path: Path, monkeypat
             train_and_export._train_segmenter("paper-segmenter", pictures, TrainingOptions(tmp_path, seed=seed))
     assert torch.equal(drawn[1], drawn[2])
     assert not torch.equal(drawn[0], drawn[1])
+
+
+def test_an_epoch_of_less_than_a_batch_is_refused(tmp_path: Path) -> None:
+    training = SegmenterTraining(PaperSegmenter(), replace(SHORT, batch=7), tmp_path, drawn_pictures(6), [])
+    with pytest.raises(UserError, match=r"^sources: 6 pictures an epoch, and a batch has 7"):
+        training.run()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_few_pictures_suffice_to_begin_from_an_exported_segmenter(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list[int] = []
+    monkeypatch.setattr(train_and_export, "cache_pictures", lambda samples: drawn_pictures(6))
+    monkeypatch.setattr(train_and_export, "load_exported", lambda model, path, batch: seen.append(len(batch)))
+    monkeypatch.setattr(SegmenterTraining, "run", lambda training: None)
+    pictures: Any = SimpleNamespace(data=tmp_path, segmented_samples=lambda held_out: [])
+    options = TrainingOptions(tmp_path / "run", start=verified_path("segmenter"))
+    train_and_export.train_network("paper-segmenter", pictures, options, 1)
+    assert seen == [6]
+
+
+def test_a_file_that_a_training_begins_from_is_opened_before_pictures_are(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(train_and_export, "cache_pictures", lambda samples: pytest.fail("pictures were read"))
+    pictures: Any = SimpleNamespace(data=tmp_path, segmented_samples=lambda held_out: [])
+    for name in ("bad.pt", "bad.onnx"):
+        (tmp_path / name).write_text("text")
+        options = TrainingOptions(tmp_path / "run", start=tmp_path / name)
+        with pytest.raises(UserError, match=f"{name}: not a readable"):
+            train_and_export.train_network("paper-segmenter", pictures, options, 1)

@@ -368,3 +368,11 @@ def test_any_file_is_sound_or_refused(actor: dict[str, object], route: dict[str,
 def _pair(item: tuple[str, object]) -> str:
     """`key = value` in TOML; JSON is, but for what is not finite."""
     return f"{item[0]} = {json.dumps(item[1]).replace('NaN', 'nan').replace('Infinity', 'inf')}"
+
+
+def test_a_file_may_begin_with_a_byte_order_mark(tmp_path: Path) -> None:
+    file = tmp_path / "a.toml"
+    file.write_text(WHOLE, encoding="utf-8-sig")
+    marked = load_scenario(file)
+    file.write_text(WHOLE, encoding="utf-8")
+    assert marked.world.water_rgb == load_scenario(file).world.water_rgb

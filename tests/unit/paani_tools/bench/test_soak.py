@@ -5,7 +5,7 @@ from __future__ import annotations
 import msgspec
 import pytest
 
-from paani_tools.bench.soak import Sample, Soaked, SoakReport, keeps_bars, slope_per_h, soak_text, soaked
+from paani_tools.bench.soak import Sample, Soaked, SoakReport, keeps_bars, main, slope_per_h, soak_text, soaked
 
 
 def samples(rss_mib_h: float, *, warm_up_mib: float = 0.0, restarted: bool = False) -> list[Sample]:
@@ -78,3 +78,10 @@ def test_the_table_names_each_process_and_what_was_dropped() -> None:
     text = soak_text(report(soaked(samples(0.5))))
     assert "| advisor | 50.5 | +0.50 | +1.00 | 19, 19 | 9, 9 | 0 |" in text
     assert "late 2" in text
+
+
+def test_a_run_too_short_for_a_slope_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stop:
+        main(["--for", "9"])
+    assert stop.value.code == 2
+    assert "argument --for: 9: expected seconds from 10" in capsys.readouterr().err

@@ -140,9 +140,24 @@ def test_other_weights_need_force_and_say_what_it_means(capsys: pytest.CaptureFi
         (("--only", "no/such"), "--only no/such"),
         (("--only", "controller/thrust"), "--commands"),
         (("--set", "bus.router=nowhere"), "router nowhere: expected"),
+        (("--from", "9999"), "--from 9999: "),
+        (("--check", "--speed", "2"), "--speed: republishes"),
+        (("--force",), "--force: goes with --check"),
         (("--set", "bus.router=tcp/192.0.2.1:7"), "bus.router tcp/192.0.2.1:7"),
     ],
-    ids=["unknown setting", "bad value", "folder", "no use", "topic", "command", "address", "foreign address"],
+    ids=[
+        "unknown setting",
+        "bad value",
+        "folder",
+        "no use",
+        "topic",
+        "command",
+        "address",
+        "foreign address",
+        "beyond the end",
+        "republishing",
+        "deciding",
+    ],
 )
 @pytest.mark.slow
 def test_a_mistake_is_one_line(
