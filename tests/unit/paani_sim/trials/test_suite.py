@@ -267,7 +267,7 @@ def test_a_finished_suite_is_only_read(
     for case in list_cases(SUITES["quick"], ["lake"], [Policy.BLIND]):
         write(tmp_path, case, reader.fingerprint(case))
     figures = tmp_path / "figures.json"
-    words = ["--worlds", "lake", "--policy", "blind", "--out", str(tmp_path), "--json", str(figures)]
+    words = ["--worlds", "lake", "lake", "--policy", "blind", "blind", "--out", str(tmp_path), "--json", str(figures)]
     assert command.main(words) == 0
     assert json.loads(figures.read_bytes())["policies"]["blind"]["trials"] == 2
     assert "blind" in capsys.readouterr().out

@@ -96,3 +96,9 @@ def test_bad_file_is_refused_by_field(tmp_path: Path, old: str, new: str, proble
 def test_unknown_vessel_is_refused(name: str) -> None:
     with pytest.raises(UserError, match=r"vessel|No such file"):
         load_vessel(name)
+
+
+def test_a_file_may_begin_with_a_byte_order_mark(tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text((FOLDER / "paper.toml").read_text(encoding="utf-8"), encoding="utf-8-sig")
+    assert load_vessel(str(file)) == load_vessel("paper")
