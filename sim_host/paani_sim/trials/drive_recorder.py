@@ -52,14 +52,18 @@ class DriveRecorder:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         if kind is not None:
-            self._log.abandon()
-            self._beside.unlink(missing_ok=True)
+            self._drop()
             return
         try:
             self._log.finish({})
             self._beside.replace(self._path)
         except OSError as failed:
+            self._drop()
             raise UserError(f"--record {self._path}: {failed.strerror}") from failed
+
+    def _drop(self) -> None:
+        self._log.abandon()
+        self._beside.unlink(missing_ok=True)
 
 
 def _attachments(config: Config) -> dict[str, bytes]:
