@@ -98,10 +98,15 @@ def facts_reader(bus: Bus, clock: Clock) -> Callable[[], Facts]:
 async def answer_forever(
     console: Console, client: str, inbox: Queue[m.OperatorRequest], station: Latest[m.Pulse]
 ) -> None:
-    """Answer one client, in the order it asks. No client waits for another."""
-    while True:
-        request = await inbox.get()
-        await console.answer(client, request, living_epoch(station))
+    """Answer one client, in the order it asks. No client waits for another, and no STOP for a disk that is to arm."""
+    arming: asyncio.Task[None] | None = None
+    async with asyncio.TaskGroup() as tasks:
+        while True:
+            request = await inbox.get()
+            if request.act is not m.RequestAct.RELEASE:
+                await console.answer(client, request, living_epoch(station))
+            elif arming is None or arming.done():  # else it is said again
+                arming = tasks.create_task(console.answer(client, request, living_epoch(station)))
 
 
 async def answer_missions_forever(console: Console, client: str, inbox: Queue[m.MissionRequest]) -> None:
