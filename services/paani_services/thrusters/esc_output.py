@@ -77,10 +77,10 @@ class EscOutput:
         try:
             status = await self._caller.call("paani_thrust", call.encode())
         except CallError:
-            self._tracker.send(decided, stopwatch_ms())
+            self._tracker.lose(stopwatch_ms())
             raise
         if status.verdict is m.McuVerdict.ACCEPTED:
-            self._tracker.accept(decided, stopwatch_ms())
+            self._tracker.accept(stopwatch_ms())
             return
         self._tracker.refuse()
         self._count_drop(f"refused_{status.verdict}")

@@ -106,26 +106,33 @@ class OutputTracker:
         self._lease_ms = lease_ms
         self._accepted: _Sent | None = None
         self._unanswered: _Sent | None = None
+        self._sent: _Sent | None = None
 
     def send(self, decided: AppliedThrust, now_ms: float) -> None:
-        """The frame of this decision is on its way; once more, that it had no answer until now."""
-        if decided.zero_cause is m.ZeroCause.NONE:
-            self._unanswered = _Sent(decided, now_ms)
+        """The frame of this decision is on its way."""
+        self._sent = _Sent(decided, now_ms)
 
-    def accept(self, decided: AppliedThrust, now_ms: float) -> None:
-        """The microcontroller has accepted the frame of this decision."""
-        self._accepted, self._unanswered = _Sent(decided, now_ms), None
+    def accept(self, now_ms: float) -> None:
+        """The microcontroller has accepted this frame: no earlier one counts any more."""
+        if self._sent is not None:
+            self._accepted, self._unanswered, self._sent = self._sent._replace(at_ms=now_ms), None, None
 
     def refuse(self) -> None:
-        """The microcontroller has refused the newest frame: what it accepted before runs on."""
-        self._unanswered = None
+        """The microcontroller has refused this frame: what came before it runs on."""
+        self._sent = None
+
+    def lose(self, now_ms: float) -> None:
+        """This frame had no answer until now."""
+        if self._sent is not None and self._sent.decided.zero_cause is m.ZeroCause.NONE:
+            self._unanswered = self._sent._replace(at_ms=now_ms)
+        self._sent = None
 
     def applied(self, decided: AppliedThrust, output_cause: m.ZeroCause, now_ms: float) -> AppliedThrust:
         """What is applied now: the decision, unless the microcontroller withholds it or still runs an earlier one."""
         if output_cause not in {m.ZeroCause.NONE, m.ZeroCause.LINE_LOST, m.ZeroCause.REFUSED}:
             return zero(decided, output_cause)
         is_zero = decided.zero_cause is not m.ZeroCause.NONE
-        for sent in (self._unanswered, self._accepted) if is_zero else (self._accepted,):
+        for sent in (self._sent, self._unanswered, self._accepted) if is_zero else (self._accepted,):
             is_live = sent is not None and now_ms - sent.at_ms <= self._lease_ms
             if sent is not None and is_live and sent.decided.zero_cause is m.ZeroCause.NONE:
                 return sent.decided

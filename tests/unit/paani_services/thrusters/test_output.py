@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import msgspec
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from paani import messages as m
 from paani.config import EscConfig, ThrustersConfig, load_config
@@ -25,6 +27,12 @@ AHEAD = AppliedThrust(0.2, 0.3, 15.0, 22.5, m.ZeroCause.NONE)
 DISARMED = AppliedThrust(0.0, 0.0, 0.0, 0.0, m.ZeroCause.NOT_ARMED)
 LIVE = McuStatus(kind=THRUST, state=m.McuState.FRESH, verdict=m.McuVerdict.ACCEPTED, enabled=True)
 LEASE_MS = 300.0
+
+
+def accept(output: OutputTracker, decided: AppliedThrust, now_ms: float) -> None:
+    """A frame of this decision that is answered at once."""
+    output.send(decided, now_ms)
+    output.accept(now_ms)
 
 
 def test_a_frame_carries_the_decision_and_its_lease() -> None:
@@ -85,32 +93,63 @@ def test_a_zero_is_applied_when_it_was_answered_or_the_lease_is_over() -> None:
     """The operator's STOP is confirmed by what the microcontroller does, not by what it was told."""
     output = OutputTracker(LEASE_MS)
     assert output.applied(AHEAD, m.ZeroCause.NONE, 0.0).zero_cause is m.ZeroCause.LINE_LOST
-    output.accept(AHEAD, 1000.0)
+    accept(output, AHEAD, 1000.0)
     assert output.applied(DISARMED, m.ZeroCause.NONE, 1100.0) == AHEAD
     assert output.applied(DISARMED, m.ZeroCause.LINE_LOST, 1000.0 + LEASE_MS) == AHEAD
     assert output.applied(DISARMED, m.ZeroCause.REFUSED, 1000.0 + LEASE_MS) == AHEAD, "refused: the last one runs on"
     assert output.applied(AHEAD, m.ZeroCause.REFUSED, 1001.0 + LEASE_MS).zero_cause is m.ZeroCause.REFUSED
     assert output.applied(DISARMED, m.ZeroCause.LINE_LOST, 1001.0 + LEASE_MS) == DISARMED
     assert output.applied(AHEAD, m.ZeroCause.LINE_LOST, 1001.0 + LEASE_MS).zero_cause is m.ZeroCause.LINE_LOST
-    output.accept(DISARMED, 1100.0)
+    accept(output, DISARMED, 1100.0)
     assert output.applied(DISARMED, m.ZeroCause.NONE, 1101.0) == DISARMED
 
 
 def test_a_frame_without_an_answer_may_have_arrived() -> None:
     """A zero is not confirmed before its lease is over as well, or a later frame was answered."""
     output = OutputTracker(LEASE_MS)
-    output.accept(AHEAD, 0.0)
-    output.send(AHEAD, 290.0)
+    accept(output, AHEAD, 0.0)
+    output.send(AHEAD, 40.0)
+    output.lose(290.0)
     output.send(DISARMED, 400.0)
+    output.lose(650.0)
     assert output.applied(DISARMED, m.ZeroCause.NONE, 290.0 + LEASE_MS) == AHEAD
     assert output.applied(DISARMED, m.ZeroCause.LINE_LOST, 291.0 + LEASE_MS) == DISARMED
     assert output.applied(AHEAD, m.ZeroCause.LINE_LOST, 301.0).zero_cause is m.ZeroCause.LINE_LOST
     output.send(AHEAD, 700.0)
+    assert output.applied(DISARMED, m.ZeroCause.NONE, 701.0) == AHEAD, "on its way"
     output.refuse()
-    assert output.applied(DISARMED, m.ZeroCause.REFUSED, 701.0) == DISARMED
+    assert output.applied(DISARMED, m.ZeroCause.REFUSED, 702.0) == DISARMED
     output.send(AHEAD, 800.0)
-    output.accept(DISARMED, 810.0)
-    assert output.applied(DISARMED, m.ZeroCause.NONE, 811.0) == DISARMED
+    output.lose(1050.0)
+    accept(output, DISARMED, 1060.0)
+    assert output.applied(DISARMED, m.ZeroCause.NONE, 1061.0) == DISARMED
+
+
+STEP_MS = st.floats(1.0, 250.0)
+FRAMES = st.lists(st.tuples(st.sampled_from([AHEAD, DISARMED]), st.sampled_from(["accept", "refuse", "lose"]), STEP_MS))
+
+
+@given(FRAMES)
+def test_no_zero_is_applied_while_a_frame_that_may_have_arrived_runs(
+    frames: list[tuple[AppliedThrust, str, float]],
+) -> None:
+    """Whatever becomes of a frame, only a later one that was accepted ends an earlier one before its lease."""
+    output, now_ms, ends_ms = OutputTracker(LEASE_MS), 0.0, 0.0
+    for decided, outcome, step_ms in frames:
+        output.send(decided, now_ms)
+        now_ms += step_ms
+        match outcome:
+            case "accept":
+                output.accept(now_ms)
+                ends_ms = now_ms + LEASE_MS if decided is AHEAD else 0.0
+            case "refuse":
+                output.refuse()
+            case "lose":
+                output.lose(now_ms)
+                ends_ms = now_ms + LEASE_MS if decided is AHEAD else ends_ms
+        for cause in (m.ZeroCause.NONE, m.ZeroCause.LINE_LOST, m.ZeroCause.REFUSED):
+            assert (output.applied(DISARMED, cause, now_ms) == AHEAD) is (now_ms <= ends_ms)
+            assert output.applied(DISARMED, cause, max(now_ms, ends_ms) + 1.0) == DISARMED
 
 
 def test_reports_come_at_their_rate_and_where_the_cause_of_a_zero_changes() -> None:
