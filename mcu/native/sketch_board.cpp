@@ -114,6 +114,7 @@ int main() {
         std::istringstream words(line);
         std::string command, name, hex;
         int first = 0, second = 0;
+        uint64_t skipped_ms = 0;
         words >> command;
         if (command == "setup") {
             setup();
@@ -129,6 +130,8 @@ int main() {
             while (words >> first) {
                 edges_after_millis.push_back(first);
             }
+        } else if (command == "skip" && words >> skipped_ms) {  // so much time, in which the loop does not turn
+            now_us += 1000 * skipped_ms;
         } else if (command == "loop" && words >> first) {  // so many turns
             for (; first > 0; --first) {
                 loop();

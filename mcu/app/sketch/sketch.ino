@@ -80,8 +80,18 @@ paani::Device& device() {
 uint16_t pulse_us(int index) {
     // An interrupt may measure another pulse at any moment: the clock is looked at last, so no age is negative.
     const uint32_t width_us = channels[index].width_us, seen_ms = channels[index].seen_ms;
-    const bool is_lost = static_cast<uint32_t>(millis()) - seen_ms >= RECEIVER_LOST_MS;
-    return is_lost || width_us > UINT16_MAX ? 0 : static_cast<uint16_t>(width_us);
+    if (static_cast<uint32_t>(millis()) - seen_ms >= RECEIVER_LOST_MS) {
+        channels[index].width_us = 0;  // for good: after 49.7 days its time would be of now again
+        return 0;
+    }
+    return width_us > UINT16_MAX ? 0 : static_cast<uint16_t>(width_us);
+}
+
+// What a pin measures, of `full` at full scale. `unknown` where the converter fails, which is a number below zero, and at
+// the end of its scale, where a wire may be broken and anything may lie beyond.
+int32_t measure(int pin, int32_t full, int32_t unknown) {
+    const int32_t reading = analogRead(pin);
+    return reading >= 0 && reading < FULL_SCALE ? reading * full / FULL_SCALE : unknown;
 }
 
 paani::Inputs read_inputs() {
@@ -94,8 +104,8 @@ paani::Inputs read_inputs() {
             inputs.receiver_us[side] = pulse_us(side);
         }
     }
-    inputs.battery_mv = static_cast<uint16_t>(analogRead(BATTERY_PIN) * BATTERY_FULL_MV / FULL_SCALE);
-    inputs.current_ca = static_cast<int16_t>(analogRead(CURRENT_PIN) * CURRENT_FULL_CA / FULL_SCALE);
+    inputs.battery_mv = static_cast<uint16_t>(measure(BATTERY_PIN, BATTERY_FULL_MV, 0));
+    inputs.current_ca = static_cast<int16_t>(measure(CURRENT_PIN, CURRENT_FULL_CA, INT16_MAX));
     return inputs;
 }
 
