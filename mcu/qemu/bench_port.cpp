@@ -60,6 +60,8 @@ void BenchPort::obey(paani::Inputs& inputs) {
         inputs.current_ca = static_cast<int16_t>(numbers[1]);
     } else if (begins_with("hang")) {
         is_hang_asked_ = true;
+    } else if (begins_with("stall") && count == 1) {
+        stall_ms_ = static_cast<uint32_t>(numbers[0]);
     } else if (begins_with("matrix")) {
         is_matrix_asked_ = true;
     } else {
@@ -69,6 +71,12 @@ void BenchPort::obey(paani::Inputs& inputs) {
         put_text("\n");
         queue_.commit();
     }
+}
+
+uint32_t BenchPort::take_stall_ms() {
+    const uint32_t duration_ms = stall_ms_;
+    stall_ms_ = 0;
+    return duration_ms;
 }
 
 void BenchPort::put_text(const char* text) {

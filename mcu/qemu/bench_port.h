@@ -8,7 +8,7 @@ namespace bench {
 
 class BenchPort {
    public:
-    // Takes one byte of `estop 0|1`, `rc LEFT_US RIGHT_US TAKE`, `rc none`, `battery MV CA`, `hang`, `matrix`.
+    // Takes one byte of `estop 0|1`, `rc LEFT_US RIGHT_US TAKE`, `rc none`, `battery MV CA`, `hang`, `stall MS`, `matrix`.
     void receive(char byte, paani::Inputs& inputs);
 
     // Says what the pins do whenever that changes, and 50 times a second: `pwm LEFT_US RIGHT_US ENABLE MCU_MS`.
@@ -18,6 +18,9 @@ class BenchPort {
     void report_matrix(const uint8_t* lights);
 
     bool is_hang_asked() const { return is_hang_asked_; }
+
+    // For how long the loop is to stand still, once; 0: it is to go on.
+    uint32_t take_stall_ms();
     bool take(uint8_t& byte) { return queue_.take(byte); }
 
    private:
@@ -35,6 +38,7 @@ class BenchPort {
     char line_[MAX_LINE] = {};
     uint8_t size_ = 0;
     bool is_hang_asked_ = false;
+    uint32_t stall_ms_ = 0;
     bool is_matrix_asked_ = false;
     paani::ReadBack reported_;
     uint32_t reported_ms_ = 0;

@@ -187,6 +187,9 @@ int main() {
         while (received[2].take(byte)) {
             bench_port.receive(static_cast<char>(byte), inputs);
         }
+        const uint32_t stall_ms = bench_port.take_stall_ms();
+        for (const uint32_t since_ms = now_ms; now_ms - since_ms < stall_ms;) {
+        }
         set_pins(device.step(inputs, read_pins(), turn_ms));
         (void)device.report(read_pins(), turn_ms);
         bench_port.report(read_pins(), turn_ms);

@@ -69,6 +69,39 @@ async def test_the_outputs_are_safe_before_the_reset(mcu: Emulator) -> None:
         assert status.reset_cause is ResetCause.WATCHDOG
 
 
+async def drive(thrust: McuCaller, mcu: Emulator) -> None:
+    """Until the outputs are live."""
+    await thrust.call("paani_esc", EscSettings(session=9, slew_per_s=10.0).encode())
+    for seq in range(1, 5):
+        call = ThrustCall(armed=seq > 1, session=9, seq=seq, lease_ms=300, left=1.0, right=1.0)
+        await thrust.call("paani_thrust", call.encode())
+    await mcu.wait_for_pins(lambda pins: pins.enable)
+
+
+async def test_a_loop_that_stood_still_is_stopped_meanwhile_and_goes_on_disarmed(mcu: Emulator) -> None:
+    """The timer's interrupt sees it after 50 ms; what the loop had decided before it stood still moves nothing."""
+    async with open_caller(mcu.thrust, THRUST) as thrust:
+        await drive(thrust, mcu)
+        begin = len(mcu.history)
+        await mcu.set_pins("stall 100")
+        await mcu.wait_for_pins(lambda pins: not pins.enable)
+        call = ThrustCall(armed=True, session=9, seq=5, lease_ms=300, left=1.0, right=1.0)
+        status = await thrust.call("paani_thrust", call.encode())
+        assert (status.verdict, status.holds, status.boot_count) == (McuVerdict.ACCEPTED, 16, 1)
+        live = [pins.enable for pins in mcu.history[begin:]]
+        assert live == sorted(live, reverse=True), "it was live again"
+        still = next(pins for pins in mcu.history[begin:] if not pins.enable)
+        assert still[:2] == (1500, 1500)
+
+
+async def test_a_loop_that_stands_still_is_reset_though_interrupts_go_on(mcu: Emulator) -> None:
+    async with open_caller(mcu.thrust, THRUST) as thrust:
+        await drive(thrust, mcu)
+        await mcu.set_pins("stall 5000")
+        status = await wait_for_boot(thrust, 2)
+        assert (status.reset_cause, status.enabled) == (ResetCause.WATCHDOG, False)
+
+
 async def test_a_reset_by_the_button_is_told_from_one_by_the_watchdog(mcu: Emulator) -> None:
     async with open_caller(mcu.guide, INDICATION) as guidance:
         await mcu.reset()
