@@ -22,6 +22,9 @@ void paani_run_until(Session* session, uint32_t now_ms) {
     } while (session->now_ms != now_ms);
 }
 
+// Time in which the loop does not turn.
+void paani_stand_still(Session* session, uint32_t duration_ms) { session->now_ms += duration_ms; }
+
 void paani_receive(Session* session, uint8_t line, const uint8_t* data, uint32_t size) {
     for (uint32_t i = 0; i < size; ++i) {
         session->device.receive(line, data[i], session->now_ms);

@@ -83,6 +83,11 @@ class Core:
         self.now_ms = (self.now_ms + duration_ms) % CLOCK
         self._library.paani_run_until(self._session, ctypes.c_uint32(self.now_ms))
 
+    def stand_still(self, duration_ms: int) -> None:
+        """Let time pass in which the loop does not turn."""
+        self.now_ms = (self.now_ms + duration_ms) % CLOCK
+        self._library.paani_stand_still(self._session, ctypes.c_uint32(duration_ms))
+
     def receive(self, line: int, data: bytes) -> None:
         self._library.paani_receive(self._session, ctypes.c_uint8(line), data, ctypes.c_uint32(len(data)))
 

@@ -6,9 +6,9 @@ import random
 
 import pytest
 
-from paani.messages import Direction, McuState
+from paani.messages import Direction, McuState, McuVerdict
 from paani.microcontroller.payloads import EscSettings, Guide, McuStatus
-from paani.microcontroller.rpc import Request, encode_request, encode_response
+from paani.microcontroller.rpc import Request, Response, encode_request, encode_response
 from tests.firmware.streams import corrupted
 from tests.unit.mcu.core import (
     CLOCK,
@@ -123,6 +123,16 @@ def test_a_head_inside_a_payload_ends_the_call_before_it(core: Core) -> None:
     assert (status.accepted, status.refusals.framing, status.refusals.crc) == (1, 1, 0)
 
 
+def test_a_call_that_was_cut_off_is_answered_under_its_own_identifier(core: Core) -> None:
+    core.take(0)
+    core.receive(0, request(guide(), 300)[:-16] + request(guide(), 7))
+    answers = [message for message in core.take(0) if isinstance(message, Response)]
+    assert [(answer.id, statuses([answer])[0].verdict) for answer in answers] == [
+        (300, McuVerdict.FRAMING),
+        (7, McuVerdict.ACCEPTED),
+    ]
+
+
 def test_silence_ends_a_call_that_was_cut_off(core: Core) -> None:
     core.receive(0, request(guide())[:-1])
     core.wait(99)
@@ -169,6 +179,19 @@ def test_it_registers_as_a_client_of_the_boards_router_has_to(core: Core) -> Non
     assert requests() == []
     core.wait(1100)
     assert requests() == [(1, "$/reset", ())]
+
+
+def test_refused_frames_confirm_no_route(core: Core) -> None:
+    """Whoever sends them may be somebody else's."""
+    for call_id in (1, 2, 3, 4, 5):
+        core.wait(1)
+        core.receive(THRUST_LINE, encode_response(call_id, True))
+    core.take(THRUST_LINE)
+    for seq in range(10):
+        core.receive(THRUST_LINE, notification(thrust(seq + 1)))
+        core.wait(1000)
+    assert core.status(THRUST_LINE).refusals.not_ready == 10
+    assert [m.method for m in core.take(THRUST_LINE) if isinstance(m, Request)] == ["$/reset"]
 
 
 class RecordedSession:

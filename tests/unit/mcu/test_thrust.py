@@ -313,3 +313,54 @@ def test_the_thrust_line_serves_no_guidance_and_the_guidance_line_no_thrust(core
     assert core.status(THRUST_LINE).accepted == 0
     core.receive(1, notification(FAST) + notification(thrust(1, armed=False)))
     assert core.status(THRUST_LINE).accepted == 2
+
+
+def test_a_receivers_rest_and_span_are_those_of_the_calibrated_sides(core: Core) -> None:
+    """Sticks are at rest within 50 us of where each side stands still, and go no further from there than thrust may."""
+    Boat(core, EscSettings(session=9, trim_left_us=100, trim_right_us=-100, span_us=300))
+    for sticks_us, is_at_rest in (
+        ((1500, 1500), False),
+        ((1651, 1400), False),
+        ((1600, 1349), False),
+        ((1650, 1350), True),
+    ):
+        core.set_pins(receiver="takes over", receiver_us=sticks_us)
+        core.wait(1)
+        assert core.status(THRUST_LINE).enabled is is_at_rest
+    core.set_pins(receiver="takes over", receiver_us=(2000, 1000))
+    core.wait(1)
+    status = core.status(THRUST_LINE)
+    assert (status.pulse_left_us, status.pulse_right_us) == (1900, 1100)
+
+
+def test_a_watchdogs_first_expiry_stops_the_receiver_until_its_sticks_were_at_rest(core: Core) -> None:
+    core.set_pins(receiver="takes over", receiver_us=NEUTRAL)
+    core.wait(1)
+    core.set_pins(receiver="takes over", receiver_us=(1800, 1800))
+    core.wait(1)
+    assert core.status(THRUST_LINE).enabled
+    core.disarm()
+    core.wait(100)
+    assert not core.status(THRUST_LINE).enabled
+    core.set_pins(receiver="takes over", receiver_us=NEUTRAL)
+    core.wait(1)
+    assert core.status(THRUST_LINE).enabled
+
+
+def test_settings_of_the_same_session_need_arming_anew(boat: Boat) -> None:
+    boat.core.wait(300)
+    assert boat.status.state is McuState.STALE
+    assert boat.core.call(FAST).verdict is McuVerdict.ACCEPTED
+    boat.drive()
+    assert (boat.status.enabled, boat.status.holds) == (False, NOT_ARMED)
+
+
+def test_thrust_grows_by_the_millisecond_and_by_no_more_than_100_after_a_turn_that_took_longer(core: Core) -> None:
+    boat = Boat(core, EscSettings(session=9, slew_per_s=0.15))
+    boat.ask(armed=False)
+    boat.drive(1000)
+    assert boat.pulses == (1560, 1560)
+    boat.ask()
+    core.stand_still(250)
+    boat.core.wait(0)
+    assert boat.pulses == (1566, 1566)
