@@ -20,11 +20,15 @@ USERS = ("operator", "dashboard", "controller", "navigator", "localization", "ob
 
 
 class ThrusterBus:
-    """`armed` None: the operator is silent. `thrust` is ordered of both sides, `turn` more of the left one."""
+    """`armed` None: the operator is silent; `word_age_us`: how old his word is when it comes.
+
+    `thrust` is ordered of both sides, `turn` more of the left one.
+    """
 
     def __init__(self, config: Config, buses: dict[str, Bus]) -> None:
         self.config, self.buses = config, buses
         self.armed: bool | None = None
+        self.word_age_us = 0
         self.thrust, self.turn, self.is_pulsing = 0.2, 0.0, True
         observer = buses["observer"]
         self.time: Latest[m.SimTime] = observer.latest(keys.SIM_TIME)
@@ -39,7 +43,7 @@ class ThrusterBus:
         while True:
             now_us = CLOCK.now_us()
             if self.armed is not None:
-                arming.put(m.Arming(source_us=now_us, armed=self.armed))
+                arming.put(m.Arming(source_us=now_us - self.word_age_us, armed=self.armed))
             for pulse in pulses if self.is_pulsing else ():
                 pulse.put(m.Pulse(source_us=now_us))
             echo_us = self.time.value.stamp_us if self.time.value else 0

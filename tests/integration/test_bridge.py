@@ -21,6 +21,7 @@ from paani.config import BridgeConfig
 from paani.microcontroller.payloads import UNKNOWN_RISK, Guide
 from paani.microcontroller.rpc import MessageScanner, Request, Response
 from paani_services.bridge.service import Bridge
+from paani_services.bridge.symbols import REASON_CODES
 from tests.at_work import at_work
 from tests.conftest import OpenAs, Spawn
 from tests.fake_router import FakeRouter
@@ -151,11 +152,15 @@ async def test_a_change_of_advice_does_not_wait_for_the_next_frame(open_as: Open
                 assert len(peer.guides) == 4
 
 
-async def test_a_silent_advisor_is_stop_and_the_frames_go_on(spawn: Spawn, open_as: OpenAs) -> None:
+@pytest.mark.parametrize("direction", [m.Direction.LEFT, m.Direction.NO_DATA])
+async def test_a_silent_advisor_is_stop_and_the_frames_go_on(
+    direction: m.Direction, spawn: Spawn, open_as: OpenAs
+) -> None:
     peer = McuPeer()
     async with tcp_line(peer) as line, bridge(spawn, open_as, line, peer) as loop:
-        loop.advisor.direction = m.Direction.LEFT
-        await until(lambda: bool(peer.guides) and peer.guides[-1].direction is m.Direction.LEFT)
+        loop.advisor.direction = direction
+        await until(lambda: bool(peer.guides) and peer.guides[-1].reason == REASON_CODES[m.Reason.CENTER_RISK])
+        assert peer.guides[-1].direction is direction
         loop.advisor.direction = None
         await until(lambda: peer.guides[-1].direction is m.Direction.STOP)
         before = len(peer.guides)

@@ -114,6 +114,14 @@ async def test_words_that_stop_coming_give_zero_but_no_disarmed_frame(boat: Boat
     assert (boat.peer.newest.left, boat.peer.newest.right) == (0.0, 0.0)
 
 
+async def test_a_word_counts_from_when_it_was_said_and_not_from_when_it_came(boat: Boat) -> None:
+    """However steadily old ones come, as over a link that holds them up."""
+    await boat.drive()
+    boat.word_age_us = 600_000
+    await boat.until_cause(m.ZeroCause.ARMING_LOST)
+    await stays(lambda: boat.peer.newest.left == boat.peer.newest.right == 0.0, 0.5)
+
+
 async def test_an_emergency_stop_wins_and_arming_again_needs_a_disarm_first(boat: Boat) -> None:
     """W9: whatever the software orders meanwhile, and after the button is released."""
     await boat.drive()
@@ -220,3 +228,14 @@ async def test_a_microcontroller_whose_answers_are_lost_is_told_to_lie_still(boa
     assert boat.peer.thrusts[-1][0] - boat.peer.thrusts[-2][0] < 2 * boat.peer.lease_ms
     boat.peer.answers = answer
     await until(lambda: boat.peer.newest.left == 0.2)
+
+
+async def test_a_stop_counts_when_the_lease_of_a_frame_is_over_whose_answer_was_lost(boat: Boat) -> None:
+    await boat.drive()
+    answer, count = boat.peer.answer, len(boat.peer.thrusts)
+    boat.peer.answers = lambda request: answer(request)[:0]
+    await until(lambda: len(boat.peer.thrusts) > count)
+    boat.armed = False
+    await boat.until_cause(m.ZeroCause.NOT_ARMED)
+    last_ms = max(at_ms for at_ms, call in boat.peer.thrusts if call.left > 0.0)
+    assert stopwatch_ms() - last_ms >= boat.peer.lease_ms

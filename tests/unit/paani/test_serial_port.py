@@ -139,6 +139,14 @@ async def test_a_babbling_device_fills_a_bounded_queue_and_costs_no_cpu_unless_i
     assert (await port.read()).endswith(b"newest")
 
 
+async def test_of_too_many_waiting_bytes_the_newest_are_kept(port: Port) -> None:
+    newest = bytes(range(256)) * (MAX_WAITING_BYTES // 256)
+    for data in (b"old", newest[:100], newest[100:]):
+        port._take(data)
+    assert await port.read() == newest
+    assert port.dropped_bytes == 3
+
+
 @pytest.mark.slow
 async def test_a_device_that_takes_no_bytes_is_given_up(
     device: Device, port: Port, monkeypatch: pytest.MonkeyPatch

@@ -218,6 +218,17 @@ def test_a_stop_while_it_arms_disarms_it(rover: RoverByTheBook) -> None:
     assert 0.0 in rover.arming
 
 
+def test_a_line_that_breaks_while_it_arms_latches(rover: RoverByTheBook) -> None:
+    rover.run(is_armed=False)
+    while not rover.arming:
+        rover.run(is_armed=True, seconds=PERIOD_MS / 1000)
+    rover.autopilot.lose_line()
+    rover.run(is_armed=True, seconds=4.0)
+    assert not rover.autopilot.is_driving
+    assert "line to the autopilot broke" in rover.problem
+    assert not rover.is_armed
+
+
 def test_one_that_was_armed_by_somebody_else_is_left_alone(rover: RoverByTheBook) -> None:
     rover.is_armed = True
     rover.run(is_armed=False)

@@ -168,6 +168,13 @@ def test_of_a_silent_microcontroller_nothing_is_claimed() -> None:
     assert note_of(state) == "not opened yet"
 
 
+def test_of_a_line_that_broke_just_now_nothing_is_claimed() -> None:
+    caller = McuCaller("serial:/dev/absent", THRUST)
+    caller.status, caller.status_ms = LIVE, 999.0
+    state = thrusters_state(caller, Sent(), m.ZeroCause.LINE_LOST, 5, 1000.0)
+    assert (state.mcu, state.enabled, state.answer_age_ms) == (m.McuState.UNKNOWN, False, 1.0)
+
+
 @pytest.mark.parametrize(
     ("profile", "sets", "named"),
     [
