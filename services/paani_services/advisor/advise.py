@@ -114,10 +114,10 @@ def _process_frame(state: AdvisorState, evidence: Evidence, config: Config) -> A
             tracker, config, evidence.width_px / max(1, evidence.height_px), water, evidence.water_edge
         )
         obstacles += candidate_obstacles(evidence, tracker, config)
-        facts = frame_facts(state.policy, water, obstacles, config)
+        aside = people_aside(tracker, evidence.width_px / max(1, evidence.height_px), config)
+        facts = frame_facts(state.policy, water, obstacles, config, aside)
         policy, decision = decide(state.policy, facts, frame_components(facts, ALL_EVIDENCE, config), config)
         decision = msgspec.structs.replace(decision, counterfactual=find_counterfactual(facts, decision, config))
-        aside = people_aside(tracker, evidence.width_px / max(1, evidence.height_px), config)
         decision = _add_people(decision, facts, aside, config)
         station_until_us = evidence.source_us + round(nobody_near_s((*facts.obstacles, *aside), config) * 1e6)
     else:
@@ -131,7 +131,8 @@ def _process_frame(state: AdvisorState, evidence: Evidence, config: Config) -> A
 
 def _remembers_station(state: AdvisorState, evidence: Evidence, tracker: TrackerState, config: Config) -> bool:
     """Whether the station may be kept in an unusable picture that was looked at for people, by what was seen before."""
-    if state.evidence is None or evidence.frame_epoch != state.evidence.frame_epoch:
+    last = state.evidence
+    if last is None or evidence.frame_epoch != last.frame_epoch or evidence.source_us < last.source_us:
         return False
     if evidence.candidates is msgspec.UNSET:
         return False
@@ -159,13 +160,17 @@ def _add_people(decision: Decision, facts: FrameFacts, aside: tuple[Obstacle, ..
 
 
 def is_well_formed(evidence: Evidence) -> bool:
-    """Whether every fraction lies in [0, 1] and every box has an area. NaN fails each comparison."""
+    """Whether the picture has a size, every fraction lies in [0, 1] and every box has an area.
+
+    NaN fails each comparison.
+    """
     lanes = (evidence.left, evidence.center, evidence.right)
     boxed: tuple[Detection | Candidate, ...] = (*evidence.detections, *(evidence.candidates or ()))
     fractions = [value for lane in lanes for value in (lane.non_water, lane.uncertainty, lane.clear_width)]
     fractions += [lane.open_width for lane in lanes if not isinstance(lane.open_width, msgspec.UnsetType)]
     fractions += evidence.water_edge
-    return all(0.0 <= value <= 1.0 for value in fractions) and all(map(is_valid_box, boxed))
+    has_size = evidence.width_px > 0 and evidence.height_px > 0
+    return has_size and all(0.0 <= value <= 1.0 for value in fractions) and all(map(is_valid_box, boxed))
 
 
 def _decision_at(state: AdvisorState, now_us: int, config: Config) -> Decision:

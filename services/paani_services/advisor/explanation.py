@@ -47,6 +47,7 @@ UNUSABLE_TEXT = {
     UnusableCause.NO_HORIZON: "shows water to its upper edge, as no boat sees it",
     UnusableCause.STALE: "was too old to look at",
 }
+NO_SIDE = frozenset({Reason.NO_SAFE_SIDE, Reason.NO_SIDE_UNOCCUPIED, Reason.NO_SIDE_FOR_LONG})
 NO_OPEN_WATER = "the way ahead shows no open water"
 CANDIDATE_TEXT = "something that may be a person"
 MAX_NAMED_TRACKS = 3  # further tracks are counted, not named
@@ -151,7 +152,8 @@ def _reason_text(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
     side_texts = [f"left {left.risk:.2f}", f"right {right.risk:.2f}"]
     if limits[0] != limits[1]:
         side_texts = [f"{text} (limit {limit:.2f})" for text, limit in zip(side_texts, limits, strict=True)]
-    side_texts = [text + _closed_by(side, tracks) for text, side in zip(side_texts, (left, right), strict=True)]
+    whys = [_reached_from(side, advisory.reason) or _closed_by(side, tracks) for side in (left, right)]
+    side_texts = [text + why for text, why in zip(side_texts, whys, strict=True)]
     sides = ", ".join(side_texts) + (f" (limit {limits[0]:.2f})" if limits[0] == limits[1] else "")
     match advisory.reason:
         case Reason.NO_EVIDENCE:
@@ -194,6 +196,11 @@ def _reason_text(advisory: Advisory, tracks: tuple[Track, ...]) -> str:
             return f"{centre} and no side is free for long; looking for a way, {sides}"
         case _:
             return f"{centre}; {sides}"
+
+
+def _reached_from(side: LaneRisk, reason: Reason) -> str:
+    """That an obstacle reaches into the way from this side, which is then not taken although nothing blocks it."""
+    return " with an obstacle that reaches in from there" if reason in NO_SIDE and not side.blocked else ""
 
 
 def _closed_by(side: LaneRisk, tracks: tuple[Track, ...]) -> str:

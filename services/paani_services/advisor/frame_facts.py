@@ -11,7 +11,7 @@ import msgspec
 from paani.boxes import area
 from paani.config import Config, PolicyConfig
 from paani.messages import SIDE_OF, BoxXyxy, Direction, LaneEvidence
-from paani_services.advisor.people import people_in_lane
+from paani_services.advisor.people import people_in_lane, people_near
 from paani_services.advisor.risk import LANES, LaneTerms, Obstacle, lane_span, lane_terms, overlap, shared_width
 
 MIN_OCCUPYING_PRESENCE = 0.5  # presence below which an unseen obstacle occupies no lane
@@ -55,7 +55,7 @@ class FrameFacts(NamedTuple):
 
     vessels_ahead: vessels large enough to block the centre (J7). reaching: obstacles in the centre by the part of it
     that they reach, `core`, `left` or `right` edge (J9). held_side: the side to take unless the other one is better by
-    `needed_gain`.
+    `needed_gain`. near: people beside whom the boat does not search.
     """
 
     lanes: dict[str, LaneFacts]
@@ -65,14 +65,19 @@ class FrameFacts(NamedTuple):
     held_side: str
     needed_gain: float
     may_search: bool
+    near: tuple[int, ...] = ()
 
 
 def frame_facts(
-    state: PolicyState, water: dict[str, LaneEvidence], obstacles: tuple[Obstacle, ...], config: Config
+    state: PolicyState,
+    water: dict[str, LaneEvidence],
+    obstacles: tuple[Obstacle, ...],
+    config: Config,
+    aside: tuple[Obstacle, ...] = (),
 ) -> FrameFacts:
     """Collect what the policy needs of one frame.
 
-    water: of each corridor. state: what the frame before left.
+    water: of each corridor. state: what the frame before left. aside: people whom the boat has turned away from.
     """
     policy = config.advisor.policy
     lanes = {}
@@ -99,7 +104,8 @@ def frame_facts(
         reaching={part: tuple(found) for part, found in reaching.items()},
         held_side=held,
         needed_gain=needed,
-        may_search=may_search(state, config),
+        may_search=may_search(state, config) and not people_near(aside, config),
+        near=people_near(obstacles, config),
     )
 
 

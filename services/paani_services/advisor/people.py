@@ -91,6 +91,21 @@ def nobody_near_s(obstacles: Iterable[Obstacle], config: Config) -> float:
     return max(0.0, min((*distances_m, people.ahead_m)) - people.stop_m) / people.swim_mps
 
 
+def people_near(obstacles: Iterable[Obstacle], config: Config) -> tuple[int, ...]:
+    """Indices of those beside whom the boat does not turn on the spot: people within `stop_m`, and what may be one.
+
+    Without a calibration everybody is.
+    """
+    people = config.advisor.people
+    if not people.use:
+        return ()
+    return tuple(
+        i
+        for i, each in enumerate(obstacles)
+        if counts(each) and (each.distance_m is None or each.distance_m <= people.stop_m)
+    )
+
+
 def nearest_ahead_m(obstacles: tuple[Obstacle, ...], ahead: Iterable[int]) -> float | None:
     """Distance of the nearest of these people; None without a calibration, or without people."""
     known = [distance for i in ahead if (distance := obstacles[i].distance_m) is not None]

@@ -118,7 +118,7 @@ def evaluate(
         left_incursion=left & (True ^ (right | is_inner)),
         right_incursion=right & (True ^ (left | is_inner)),
         prefers_right=_is_clear_gain(gain, facts.needed_gain) ^ (facts.held_side == "right"),
-        may_search=facts.may_search & shows_water,
+        may_search=facts.may_search & shows_water & (True ^ evidence.has_any(facts.near)),
         is_person_ahead=evidence.has_any(people),
     )
 

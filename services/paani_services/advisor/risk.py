@@ -262,13 +262,15 @@ def stands_ashore(box: BoxXyxy, water_edge: tuple[float, ...]) -> bool:
     """Whether what is boxed stands on land or aboard: it ends above the water's edge, there and on both sides.
 
     The water ends below the box by `ASHORE_ROWS` of the mask and more, across the box and as far again on each side;
-    so somebody in the water before a shore, or beside it, is not ashore. Nobody of `ASHORE_HEIGHT` and more is.
+    so somebody in the water before a shore, or beside it, is not ashore. Nobody of `ASHORE_HEIGHT` and more is, nor
+    anybody above a column without water at the picture's bottom: the bow or a glint may be all that ends it there.
     """
     if not water_edge or box[3] - box[1] >= ASHORE_HEIGHT:
         return False
     columns, width = len(water_edge), box[2] - box[0]
     first, last = max(0, int((box[0] - width) * columns)), min(columns, math.ceil((box[2] + width) * columns))
-    return min(water_edge[first:last], default=0.0) >= box[3] + ASHORE_ROWS / MASK_ROWS
+    edge = water_edge[first:last]
+    return bool(edge) and box[3] + ASHORE_ROWS / MASK_ROWS <= min(edge) and max(edge) < 1.0
 
 
 def foot_by_mask(box: BoxXyxy, span: tuple[float, float], water_edge: tuple[float, ...]) -> float | None:

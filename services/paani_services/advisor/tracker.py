@@ -142,12 +142,15 @@ def remember_attitude(state: TrackerState, odometry: Odometry | None) -> Tracker
 def update_tracks(state: TrackerState, evidence: Evidence, config: Config) -> TrackerState:
     """Update the tracks with the detections of one new frame; an unusable frame only lets holds run out.
 
-    The caller passes each distinct frame once. Malformed boxes are left out and counted.
+    The caller passes each distinct frame once. Malformed boxes are left out and counted. Where there are more boxes or
+    tracks than are kept, people come before all others.
     """
-    settings = config.advisor.tracker
+    settings, sees_people = config.advisor.tracker, config.advisor.people.use
     state = _advance_clock(state, evidence)
     detections = evidence.detections if evidence.usable else ()
-    valid = sorted((d for d in detections if is_valid_box(d)), key=lambda d: -d.confidence)[: settings.max_tracks]
+    ranked = sorted((d for d in detections if is_valid_box(d)), key=lambda d: -d.confidence)
+    first = sorted(range(len(ranked)), key=lambda i: not (sees_people and ranked[i].label is Label.PERSON))
+    valid = [ranked[i] for i in sorted(first[: settings.max_tracks])]
     frame = _Frame(
         state.at_us,
         camera_view(state.attitudes, evidence, config),
@@ -174,10 +177,12 @@ def update_tracks(state: TrackerState, evidence: Evidence, config: Config) -> Tr
             identity = Identity(next(new_ids), frame.at_us, motion=history)
             tracks.append(_new_track(detection, _update_identity(identity, detection, frame), frame))
     alive = [t for t in tracks if (frame.at_us - t.seen_us) * 1e-6 < settings.hold_s]
-    newest = sorted(range(len(alive)), key=lambda i: (-alive[i].seen_us, -alive[i].display_confidence, i))
+    newest = sorted(alive, key=lambda t: (-t.seen_us, -t.display_confidence))
+    newest.sort(key=lambda t: not (sees_people and is_person(t, frame.at_us, settings)))
+    kept = {t.id for t in newest[: settings.max_tracks]}
     return msgspec.structs.replace(
         state,
-        tracks=tuple(alive[i] for i in sorted(newest[: settings.max_tracks])),
+        tracks=tuple(t for t in alive if t.id in kept),
         next_id=next(new_ids),
         epoch_changed=False,
         malformed=state.malformed + sum(not is_valid_box(d) for d in detections),
@@ -303,7 +308,7 @@ def _update_identity(before: Identity, detection: Detection, frame: _Frame, *, i
         born_us=min(before.born_us, frame.at_us),
         hits=before.hits + 1,
         motion=add_measurement(before.motion, measurement, frame.window, frame.config.motion),
-        person_us=frame.at_us if detection.label is Label.PERSON else before.person_us,
+        person_us=max(frame.at_us, 1) if detection.label is Label.PERSON else before.person_us,
     )
 
 

@@ -27,7 +27,7 @@ def find_candidates(
     detections: tuple[Detection, ...],
     config: CandidateConfig,
 ) -> tuple[Candidate, ...]:
-    """What may be a person, the most confident first, at most `max_count`.
+    """What may be a person, at most `max_count`: unsure boxes first, each kind by falling confidence.
 
     mask, confidence: of the picture as it is, [h, w]. visible_frac: fraction of each cell that is not own hull.
     people: boxes of people by their score alone, with the low threshold. Of those, the ones that are no detection and
@@ -48,7 +48,8 @@ def find_candidates(
         if is_large_enough(candidate.box_xyxy)
         and not any(covered_frac(candidate.box_xyxy, box) >= COVERED_FRAC for box in known)
     ]
-    return tuple(sorted((*unsure, *lone), key=lambda c: -c.confidence)[: config.max_count])
+    # Their confidences do not compare: a mask is surer of any buoy than a detector of somebody whom it does not detect.
+    return tuple(c for kind in (unsure, lone) for c in sorted(kind, key=lambda c: -c.confidence))[: config.max_count]
 
 
 def is_reflection(mask: U8, detection: Detection, config: CandidateConfig) -> bool:

@@ -98,7 +98,7 @@ class CandidateConfig(Section, frozen=True):
     person_confidence: Fraction = 0.15  # of a box that is not sure of a person; below `detections.confidence`
     water_share: Fraction = 0.80  # of the mask beside and below such a box, which then stands in water
     min_cells: Size = 4  # of the mask: 4 of its 5,120 are 0.1 m seen from 2 m
-    max_count: Size = 12  # handed on, the most confident first
+    max_count: Size = 12  # handed on: unsure boxes first, each kind by falling confidence
     # A box of a person in which the mask shows water alone is a reflection if it is at least that high and less sure.
     # Of 1,425 boxes on people that are so high, 637 of photographs (157 held out) and 788 rendered, none is; 4 surer
     # ones are. It counts by the full set's networks alone: of 588 boxes on people by the open ones, one is.

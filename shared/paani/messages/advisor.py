@@ -244,7 +244,8 @@ class Advisory(Message, frozen=True, kw_only=True):
     speed_limit_mps: not to be exceeded while somebody is near, or by an uncalibrated camera; unset otherwise.
     people_ahead: tracks of people who block the way ahead, unset where people are weighed as anything else.
     candidates_ahead: numbers of `Evidence.candidates`, from 1, that block the way ahead, as they may be people; unset
-    where none does. person_distance_m: of the nearest of all of these, unset where no calibration tells it.
+    where none does. person_distance_m: of the nearest of the people, or else of what may be people; unset where no
+    calibration tells it.
     may_keep_station: a STOP for what lies on the water, in a picture that is fit, with nobody near: thrust may hold the
     boat where it is. So it may in a picture whose view alone is doubted, for as long as the last fit one tells that
     nobody can have come near. Unset for every other advice.

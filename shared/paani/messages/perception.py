@@ -111,8 +111,9 @@ class Evidence(Message, frozen=True, kw_only=True):
     `water_edge`: for each column of the mask as it is, left to right, the lower edge of the first cell that is not
     water, from the bottom up and own hull skipped, as a fraction of the picture's height from its top. 1: no water at
     the bottom of that column; 0: water to the top. Empty: no mask.
-    `candidates`: what may be a person, the most confident first; unset where that is not asked. Of an unusable picture
-    that was looked at, the people among its detections come first, as it has no detections.
+    `candidates`: what may be a person, unsure boxes first and each kind by falling confidence; unset where that is not
+    asked. Of an unusable picture that was looked at, the people among its detections come first, as it has no
+    detections.
     """
 
     frame_seq: Count

@@ -39,7 +39,10 @@ def test_a_stop_for_somebody_says_stop_once_and_who_closes_both_sides() -> None:
         (m.LaneRisk(risk=0.3, blocked=True, limit=0.58, track_ids=(1,)), "right 0.30 with somebody in it"),
         (m.LaneRisk(risk=0.3, blocked=True, limit=0.58, track_ids=(2,)), "right 0.30 not free"),
         (m.LaneRisk(risk=0.58, blocked=True, limit=0.58), "right 0.58 (limit 0.58)"),
-        (m.LaneRisk(risk=0.3, blocked=False, occupied=True, limit=0.58), "right 0.30 (limit 0.58)"),
+        (
+            m.LaneRisk(risk=0.3, blocked=False, limit=0.58),
+            "right 0.30 with an obstacle that reaches in from there (limit 0.58)",
+        ),
     ],
 )
 def test_a_side_says_what_closes_it_unless_its_risk_does(side: m.LaneRisk, says: str) -> None:

@@ -220,6 +220,12 @@ def test_somebody_on_a_far_bank_is_not_in_the_way_but_somebody_near_is() -> None
     for column in (36, 39, 43):  # beside and below the angler
         inlet = msgspec.structs.replace(bank, water_edge=tuple(0.4 if i == column else 0.55 for i in range(80)))
         assert play([inlet])[1][0].direction is not m.Direction.STRAIGHT
+    for first, last in (
+        (0, 80),
+        (39, 40),
+    ):  # no water at the bottom: what is there may be the bow, or a glint before it
+        bow = msgspec.structs.replace(bank, water_edge=tuple(1.0 if first <= i < last else 0.55 for i in range(80)))
+        assert play([bow])[1][0].people_ahead
     near = box(m.Label.PERSON, (0.45, 0.32, 0.53, 0.53))
     assert play([msgspec.structs.replace(bank, detections=(near,), water_edge=(0.6,) * 80)])[1][0].people_ahead
     unknown = msgspec.structs.replace(bank, water_edge=())

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from paani import messages as m
 from paani_services.advisor.advise import AdvisorState, advise, is_well_formed
 from paani_services.advisor.risk import foot_range_m, nearest_range_m
-from tests.unit.paani_services.advisor.advisor_evidence import CALIBRATED, CLEAR, T0_US, box, play, seeing
+from tests.unit.paani_services.advisor.advisor_evidence import CALIBRATED, CLEAR, PAANI, T0_US, box, play, seeing
 
 AHEAD = (0.47, 0.42, 0.53, 0.50)
 LAND = m.LaneEvidence(non_water=1.0, uncertainty=0.8, clear_width=0.0)
@@ -82,6 +82,34 @@ def test_somebody_whom_the_boat_has_turned_away_from_is_still_near() -> None:
         keeps.append(advisory.may_keep_station)
     assert any(track.is_out_of_view for track in state.tracker.tracks)
     assert keeps == [msgspec.UNSET] * 5
+
+
+def test_a_person_of_the_first_instant_is_remembered_as_any_other() -> None:
+    state, seen = AdvisorState(), []
+    for number, label in enumerate((m.Label.PERSON, m.Label.BUOY, m.Label.BUOY)):
+        frame = msgspec.structs.replace(seeing(box(label, AHEAD, 0.9)), source_us=number * FRAME_US, frame_seq=number)
+        state, advisory, _ = advise(state, frame, frame.source_us, PAANI)
+        seen.append(advisory.people_ahead)
+    assert seen == [(1,)] * 3
+
+
+def test_nobody_is_forgotten_for_more_boxes_than_are_kept() -> None:
+    """Neither somebody seen a moment ago, nor the least sure box of a picture."""
+    kept = PAANI.advisor.tracker.max_tracks
+    things = [(0.01 + 0.04 * (i % 24), 0.52 + 0.1 * (i // 24)) for i in range(kept)]
+    crowd = [box(m.Label.BUOY, (x, y, x + 0.01, y + 0.02), 0.9) for x, y in things]
+    swimmer = box(m.Label.PERSON, AHEAD, 0.5)
+    for frames in ([seeing(swimmer)] * 2 + [seeing(*crowd)], [seeing(*crowd, swimmer)]):
+        _, advice, tracks = play(frames)
+        assert advice[-1].people_ahead
+        assert len(tracks[-1].tracks) == kept
+
+
+@pytest.mark.parametrize(("width_px", "height_px"), [(0, 240), (320, 0)])
+def test_a_picture_without_a_size_tells_no_distance_and_stops_the_boat(width_px: int, height_px: int) -> None:
+    frame = msgspec.structs.replace(CLEAR, width_px=width_px, height_px=height_px)
+    advisory = play([CLEAR, frame], CALIBRATED)[1][-1]
+    assert (advisory.direction, advisory.reason) == (m.Direction.STOP, m.Reason.MALFORMED_EVIDENCE)
 
 
 @pytest.mark.parametrize("spoilt", [float("nan"), 1.5, -0.1])

@@ -136,6 +136,15 @@ def test_the_most_confident_are_handed_on() -> None:
     assert min(c.box_xyxy[0] for c in found) > 0.3
 
 
+def test_no_number_of_lone_obstacles_hides_who_may_be_a_person() -> None:
+    """However sure the mask is of them: it says that they are no water, not that they are somebody."""
+    mask = lake(*((30, left, 33, left + 2) for left in range(2, 78, 4)))
+    unsure = person((0.45, 0.72, 0.52, 0.85), 0.16)
+    found = find_candidates(mask, SURE, VISIBLE, (unsure,), (), RULES)
+    assert len(found) == RULES.max_count
+    assert found[0].box_xyxy == unsure.box_xyxy
+
+
 def test_people_are_decoded_by_their_own_score_with_their_own_threshold() -> None:
     rows = np.array([[100, 100, 40, 40, 0.2, 0.7, 0, 0], [200, 100, 40, 40, 0.1, 0, 0, 0]], np.float32).T[None]
     place = LetterboxTransform(1.0, 1.0, 0, 0, 320, 256)
