@@ -15,6 +15,7 @@ from paani_sim.eye.labels import WATER_CODE
 from paani_sim.eye.renderer import Eye
 from paani_sim.trials.drive import Drive
 from paani_sim.trials.drive_states import DriveOutcome, DrivePhase
+from paani_sim.trials.evidence_source import CameraEvidenceSource
 from paani_sim.trials.ground_truth_evidence import GroundTruthEvidenceSource, find_water_edge, level_mask
 from paani_sim.trials.policies import Policy, load_policy_config, time_limit_factor
 from paani_sim.trials.result import TrialResult
@@ -131,6 +132,16 @@ def test_unusable_rendered_camera_stops_the_boat(launch: Launch, kind: FaultKind
     [reaction] = result.reactions
     assert reaction.in_time
     assert result.unusable > 0
+
+
+@pytest.mark.gl
+@pytest.mark.parametrize("policy", [Policy.PAANI, Policy.PAANI_WIDE, Policy.PAPER])
+def test_a_policy_of_a_camera_sees_by_rendered_pictures_alone(policy: Policy) -> None:
+    """W14: no evidence from ground truth."""
+    given = scenario(1.0)
+    source = open_evidence_source(policy, given, load_policy_config(policy))
+    assert isinstance(source, CameraEvidenceSource)
+    source.close()
 
 
 @pytest.mark.gl
