@@ -40,7 +40,7 @@ class Boat:
         picture = np.full((240, 320, 3), PICTURE_BGR, np.uint8)
         mask = np.zeros((64, 80), np.uint8)
         mask[:, round(80 * MASK_EDGE) :] = 1
-        self._jpeg = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 95])[1].tobytes()
+        self.jpeg = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 95])[1].tobytes()
         self._png = cv2.imencode(".png", mask)[1].tobytes()
         self.seq = 0
         self.frame_offset = 0
@@ -55,7 +55,7 @@ class Boat:
     def publish(self) -> None:
         now_us, self.seq = self._clock.now_us(), self.seq + 1
         picture = m.PictureHeader(source_us=now_us, frame_seq=self.seq, frame_epoch=1, width_px=320, height_px=240)
-        self._pictures.put_picture(picture, self._jpeg)
+        self._pictures.put_picture(picture, self.jpeg)
         frame_seq = self.seq + self.frame_offset
         header = msgspec.structs.replace(
             picture, frame_seq=frame_seq, width_px=80, height_px=64, media_type="image/png"

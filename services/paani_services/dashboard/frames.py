@@ -18,12 +18,14 @@ MAX_KEY_BYTES, MAX_HEADER_BYTES = 0xFF, 0xFFFF
 class FrameHeader(msgspec.Struct, frozen=True, omit_defaults=True):
     """`age_ms`: time from the message's receipt until the frame was made. `picture`: a picture's header.
 
-    `at_us`: the moment of the past that the frame belongs to [Unix us]; left out of a live one.
+    `at_us`: the moment of the past that the frame belongs to [Unix us]; left out of a live one. `made_us`: when a live
+    one was made, by a clock that is never set.
     """
 
     age_ms: int
     picture: msgspec.Raw = msgspec.Raw()
     at_us: int = 0
+    made_us: int = 0
 
 
 def encode_frame(key: str, header: FrameHeader, body: bytes) -> bytes:

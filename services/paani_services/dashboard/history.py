@@ -15,7 +15,7 @@ from typing import NamedTuple, TypeVar
 from paani import keys
 from paani import messages as m
 from paani.bus import Picture
-from paani_services.dashboard.frames import pack_frames
+from paani_services.dashboard.frames import FrameHeader, pack_frames
 from paani_services.dashboard.hub import Event, Hub, Value, encode_value
 from paani_services.dashboard.time_series import SAMPLE_PERIOD_US, Sample, sample_of
 
@@ -83,7 +83,7 @@ def encode_keyframe(hub: Hub, now_us: int) -> Iterable[bytes]:
         chosen, chosen_us = next(
             ((each, us) for each, us in hub.recent(key) if frame_id(each) == frame), (value, received_us)
         )
-        yield encode_value(key, chosen, now_us - chosen_us, now_us)
+        yield encode_value(key, chosen, FrameHeader(age_ms=max(0, (now_us - chosen_us) // 1000), at_us=now_us))
 
 
 def frame_id(value: Value) -> tuple[int, int] | None:

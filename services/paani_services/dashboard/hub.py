@@ -1,4 +1,4 @@
-"""Hub between the bus and the pages: the newest message of each topic, and a queue per client. No sockets, no clock."""
+"""Hub between the bus and the pages: the newest message of each topic, and a queue per client. No sockets."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import msgspec
 from paani import keys
 from paani import messages as m
 from paani.bus import Picture
+from paani.clock import MonotonicClock
 from paani_services.dashboard.client_queue import ClientQueue
 from paani_services.dashboard.frames import FrameHeader, encode_frame
 
@@ -45,6 +46,7 @@ class Hub:
     def __init__(self) -> None:
         self.clients: set[Client] = set()
         self.has_clients = asyncio.Event()
+        self._steady = MonotonicClock()
         self._values: dict[str, tuple[Value, int]] = {}
         self._watchers: dict[str, set[asyncio.Event]] = {}
         self._recent: dict[str, deque[tuple[Value, int]]] = {key: deque(maxlen=RECENT) for key in FRAME_KEYS}
@@ -54,9 +56,9 @@ class Hub:
         """Add a client; the newest value of every key is already in its queue."""
         client = Client()
         for key, (value, received_us) in self._values.items():
-            client.queue.put_state(key, encode_value(key, value, now_us - received_us))
+            client.queue.put_state(key, self._encode(key, value, now_us - received_us))
         for event in [*self.events][-MAX_EVENTS:]:
-            client.queue.put_event(encode_value(EVENT_KEY, event, now_us - event.at_us))
+            client.queue.put_event(self._encode(EVENT_KEY, event, now_us - event.at_us))
         client.frames_ready.set()
         self.clients.add(client)
         self.has_clients.set()
@@ -75,7 +77,7 @@ class Hub:
         if key in self._recent:
             self._recent[key].append((value, received_us))
         if self.clients:
-            frame = encode_value(key, value, now_us - received_us)
+            frame = self._encode(key, value, now_us - received_us)
             for client in self.clients:
                 client.queue.put_state(key, frame)
                 client.frames_ready.set()
@@ -96,7 +98,7 @@ class Hub:
     def publish_event(self, event: Event) -> None:
         """Queue an event for every client."""
         self.events.append(event)
-        frame = encode_value(EVENT_KEY, event, 0)
+        frame = self._encode(EVENT_KEY, event, 0)
         for client in self.clients:
             client.queue.put_event(frame)
             client.frames_ready.set()
@@ -113,14 +115,13 @@ class Hub:
         """The newest values of a key whose messages belong to frames, and when they came; none of any other key."""
         return self._recent.get(key, ())
 
+    def _encode(self, key: str, value: Value, age_us: int) -> bytes:
+        return encode_value(key, value, FrameHeader(age_ms=max(0, age_us // 1000), made_us=self._steady.now_us()))
 
-def encode_value(key: str, value: Value, age_us: int, at_us: int = 0) -> bytes:
-    """One frame: a message as JSON, a picture as its bytes with its header in the frame's header.
 
-    at_us: the moment of the past it belongs to; 0: none, it is live.
-    """
-    age_ms = max(0, age_us // 1000)
+def encode_value(key: str, value: Value, header: FrameHeader) -> bytes:
+    """One frame: a message as JSON, a picture as its bytes with its header in the frame's header."""
     if isinstance(value, Picture):
-        header = FrameHeader(age_ms=age_ms, picture=msgspec.Raw(msgspec.json.encode(value.header)), at_us=at_us)
-        return encode_frame(key, header, value.data)
-    return encode_frame(key, FrameHeader(age_ms=age_ms, at_us=at_us), msgspec.json.encode(value))
+        picture = msgspec.Raw(msgspec.json.encode(value.header))
+        return encode_frame(key, msgspec.structs.replace(header, picture=picture), value.data)
+    return encode_frame(key, header, msgspec.json.encode(value))

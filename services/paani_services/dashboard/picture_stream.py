@@ -9,6 +9,7 @@ from aiohttp import web
 
 from paani import keys
 from paani.bus import Picture
+from paani_services.dashboard.connections import hold_little_unsent
 from paani_services.dashboard.hub import Hub
 from paani_services.dashboard.responses import error_response
 
@@ -34,6 +35,7 @@ class PictureStreams:
         try:
             with self._hub.changes(keys.PICTURE.name) as changed:
                 await response.prepare(request)
+                hold_little_unsent(request)
                 while may_watch():
                     await changed.wait()
                     changed.clear()

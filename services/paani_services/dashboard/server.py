@@ -19,7 +19,7 @@ from paani.operator_client import OperatorClient
 from paani.page_address import LOGIN_PATH
 from paani.tuning_refusals import refusal_text
 from paani_services.dashboard.answers import ArmedAnswer, HeldAnswer, StopAnswer
-from paani_services.dashboard.connections import BoundedConnections
+from paani_services.dashboard.connections import UNSENT_BYTES, BoundedConnections, hold_little_unsent
 from paani_services.dashboard.driving import Driving
 from paani_services.dashboard.gatekeeper import Gatekeeper
 from paani_services.dashboard.history import History
@@ -210,9 +210,12 @@ class Server:
     async def _socket(self, request: web.Request) -> web.StreamResponse:
         if not is_same_origin(request.headers.get("Origin"), request.host):
             return error_response(403, "Origin: only this server's own page may watch", "Origin")
-        socket = web.WebSocketResponse(heartbeat=HEARTBEAT_S, compress=False, max_msg_size=1024)
+        socket = web.WebSocketResponse(
+            heartbeat=HEARTBEAT_S, compress=False, max_msg_size=1024, writer_limit=UNSENT_BYTES
+        )
         socket.headers.update(SECURITY_HEADERS)
         await socket.prepare(request)
+        hold_little_unsent(request)
         client = self._hub.add_client(self._clock.now_us())
         self._sockets[client] = socket
         closing = [

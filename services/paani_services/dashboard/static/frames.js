@@ -4,7 +4,7 @@
 const utf8 = new TextDecoder();
 
 /**
- * @typedef {{age_ms: number, picture?: any, at_us?: number}} FrameHeader
+ * @typedef {{age_ms: number, picture?: any, at_us?: number, made_us?: number}} FrameHeader
  * @param {ArrayBuffer} buffer
  * @returns {{key: string, header: FrameHeader, body: Uint8Array}}
  */
