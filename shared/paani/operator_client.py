@@ -37,10 +37,12 @@ class OperatorClient:
 
     async def stop(self, timeout_s: float) -> m.OperatorState | None:
         """Ask for STOP; the state in which it is latched, or None where nobody has answered in time."""
-        heard_before = self.states.received
+        heard_before, before = self.states.received, self.states.value
 
         def is_latched(state: m.OperatorState) -> bool:
-            return state.stopped and self.states.received > heard_before
+            """A state of before the request says nothing of it, though a STOP held then too."""
+            is_answer = before is None or (state.epoch, state.stops) != (before.epoch, before.stops)
+            return state.stopped and is_answer and self.states.received > heard_before
 
         return await self._ask(m.RequestAct.STOP, 0, is_latched, timeout_s)
 

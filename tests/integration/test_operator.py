@@ -156,3 +156,27 @@ async def test_paani_stop_without_a_router_is_one_line(private_sets: tuple[str, 
     output = out + errors
     assert (code, output.count("\n")) == (2, 1)
     assert "bus.r" in output or "credentials" in output
+
+
+async def test_a_stop_is_latched_once_it_was_heard_and_not_because_one_held_before(open_as: OpenAs) -> None:
+    """Of a request that is lost nobody is told that it was done."""
+    operator, client = await open_as("operator"), OperatorClient(await open_as("dashboard"), CLOCK)
+    states, requests = operator.publisher(keys.OPERATOR_STATE), operator.queue(keys.REQUESTS["dashboard"])
+    stops = 3
+
+    async def speak_forever() -> None:
+        while True:
+            states.put(m.OperatorState(source_us=CLOCK.now_us(), armed=False, stopped=True, by="stop", stops=stops))
+            await asyncio.sleep(0.05)
+
+    async with at_work(speak_forever()), asyncio.timeout(20):
+        while client.state is None:
+            await asyncio.sleep(0.01)
+        assert await client.stop(0.5) is None
+        assert len(requests.drain()) > 1, "it is said again"
+        asking = asyncio.create_task(client.stop(10.0))
+        await requests.get()
+        stops = 4
+        answer = await asking
+        assert answer is not None
+        assert answer.stops == 4
