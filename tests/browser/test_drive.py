@@ -115,6 +115,13 @@ async def test_a_hand_on_the_page_drives_while_it_holds_and_the_wheel_is_taken_o
             assert orders.stick == (0.0, 0.0), "a key that is still down is pressed anew"
             await page.keyboard.up("d")
 
+        await page.focus("#time-speed")
+        await page.keyboard.down("ArrowDown")
+        await asyncio.sleep(0.3)
+        assert orders.stick == (0.0, 0.0), "a key goes into the field that it is pressed in"
+        await page.keyboard.up("ArrowDown")
+        await page.evaluate("document.activeElement.blur()")
+
         box = await page.locator("#stick").bounding_box()
         middle = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
         await page.mouse.move(*middle)

@@ -17,6 +17,22 @@ from tests.conftest import OpenAs, Spawn
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
 
+# How often STOP was asked after each of: a press, a second press, the answer to the first, the answer to the second.
+PRESS_TWICE = """async () => {
+  const answers = [], counts = [];
+  document.body.innerHTML = '<button id="stop"></button>';
+  window.fetch = () => new Promise((resolve) => answers.push(() => resolve({ ok: true })));
+  const { bindStop } = await import("/static/stop.js");
+  bindStop(() => {});
+  const press = () => dispatchEvent(new KeyboardEvent("keydown", { key: "Escape" }));
+  for (const act of [press, press, () => answers[0](), () => answers[1]?.()]) {
+    act();
+    await new Promise((resolve) => setTimeout(resolve, 100));
+    counts.push(answers.length);
+  }
+  return counts;
+}"""
+
 
 class Silence:
     """Requests that are kept without an answer, as on a link that is dead, for as long as it lasts.
@@ -68,6 +84,11 @@ async def test_a_stop_without_an_answer_is_asked_again_on_a_new_connection(
         await until(
             page, "document.querySelector('#order-detail').textContent.startsWith('confirmed by the thrust adapter in')"
         )
+
+
+async def test_a_press_while_an_earlier_stop_waits_for_its_answer_is_asked_for_too(scripts_page: Any) -> None:
+    """The boat may have been armed since that one was latched."""
+    assert await scripts_page.evaluate(PRESS_TWICE) == [1, 1, 2, 2]
 
 
 async def test_a_hand_drives_again_after_a_link_that_swallowed_what_it_said(

@@ -6,6 +6,7 @@
 import { isReplay } from "./inhibits.js";
 import { hand, hasKey, post } from "./requests.js";
 import { DRIVE_TEXTS, MODE_BARS, MODE_TEXTS, WHEEL_TEXTS, byId, fixed, make, sentence, setText } from "./text.js";
+import { isTyping } from "./time.js";
 import { describeWheel } from "./wheel.js";
 
 const SAY_MS = 80; // the operator's process lets a stick go that it has not heard of for 300 ms
@@ -120,7 +121,7 @@ function bindStick() {
 
 function bindKeys() {
   addEventListener("keydown", (event) => {
-    if (!canDrive || !(event.code in KEYS) || event.ctrlKey || event.metaKey || event.altKey) return;
+    if (!canDrive || !(event.code in KEYS) || event.ctrlKey || event.metaKey || event.altKey || isTyping(event.target)) return;
     event.preventDefault();
     if (event.repeat) return; // a key that was held before the wheel was, or while the link was lost, is pressed anew
     held.add(event.code);

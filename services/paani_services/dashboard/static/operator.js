@@ -2,7 +2,7 @@
 // The operator's controls: arming is a hold that expires; what became of a STOP is shown beside it.
 
 import { findInhibits, isOfArming, isReplay } from "./inhibits.js";
-import { bindKey, hasKey, post } from "./requests.js";
+import { bindKey, hadKey, post } from "./requests.js";
 import { CONFIRM_MS, bindStop, pendingStop } from "./stop.js";
 import { html, mount, signal } from "./templates.js";
 import { ARM_TEXTS, ORDER_TEXTS, STAGES, byId, fixed, operatorText, setText, words } from "./text.js";
@@ -25,7 +25,7 @@ async function send(act) {
 
 function hold() {
   refusal = "";
-  if (!hasKey()) return;
+  if (!hadKey()) return;
   press = 1 + Math.floor(Math.random() * 2 ** 50);
   heldFrom = performance.now();
   void send("hold");
@@ -51,8 +51,8 @@ export function bindOperatorControls() {
   mount("#arm-reasons", () => remainingList(JSON.parse(remaining.value)));
   const button = byId("arm");
   button.addEventListener("pointerdown", (/** @type {PointerEvent} */ event) => {
-    button.setPointerCapture(event.pointerId);
     hold();
+    if (heldFrom) button.setPointerCapture(event.pointerId);
   });
   button.addEventListener("pointerup", () => release(true));
   button.addEventListener("pointercancel", () => release(false));

@@ -52,6 +52,12 @@ export function hasKey() {
   return Boolean(key);
 }
 
+/** Whether there was a key already. Whoever is asked for one has let go of what was held, of which the page hears nothing. */
+export function hadKey() {
+  const had = hasSession || Boolean(key);
+  return hasKey() && had;
+}
+
 /**
  * Send a request; why it was refused, empty where it was not. A key that is refused is forgotten.
  * @param {string} path @param {object} body @param {boolean} [isLast] it is sent although the page goes away @param {number} [limitMs]

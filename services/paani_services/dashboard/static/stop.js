@@ -8,18 +8,18 @@ import { ORDER_TEXTS, byId, fixed } from "./text.js";
 const RETRY_MS = 400, ANSWER_MS = 2000, PAD_PERIOD_MS = 40;
 const PAD_BUTTON = 1; // B of the standard layout, the circle of others
 export const CONFIRM_MS = 1000; // a STOP that takes longer is said to be not confirmed
-let isPending = false, askedAt = 0;
+let presses = 0, latched = 0, askedAt = 0; // how often it was pressed, and of how many presses the server says that they are latched
 let answeredAt = 0; // when the server said that a STOP is latched; 0 once the operator's process has spoken since
 
 async function stop() {
-  if (isPending) return;
-  isPending = true;
+  if (latched < presses++) return; // asked for below, as the boat may have been armed since the request that is under way
   askedAt = performance.now();
-  while (isPending) {
+  while (latched < presses) {
+    const asked = presses;
     try {
-      if ((await fetch("/api/stop", { method: "POST", signal: AbortSignal.timeout?.(ANSWER_MS) })).ok) isPending = false, (answeredAt = performance.now());
+      if ((await fetch("/api/stop", { method: "POST", signal: AbortSignal.timeout?.(ANSWER_MS) })).ok) latched = asked, (answeredAt = performance.now());
     } catch { /* asked again below */ }
-    if (isPending) await new Promise((resolve) => setTimeout(resolve, RETRY_MS));
+    if (latched < asked) await new Promise((resolve) => setTimeout(resolve, RETRY_MS));
   }
 }
 
@@ -27,7 +27,7 @@ async function stop() {
 export function bindStop(onAsk, onLatched = () => {}) {
   const press = () => {
     onAsk();
-    void stop().then(() => isPending || onLatched());
+    void stop().then(() => latched < presses || onLatched());
   };
   byId("stop").addEventListener("pointerdown", press);
   byId("stop").addEventListener("click", press);
@@ -53,7 +53,7 @@ function bindPad(press) {
 /** A STOP that the operator's process has not confirmed yet; null where there is none. @param {number} now @param {number} heardAgoMs since its newest word came */
 export function pendingStop(now, heardAgoMs) {
   if (now - heardAgoMs >= answeredAt) answeredAt = 0;
-  if (!isPending && !answeredAt) return null;
+  if (latched === presses && !answeredAt) return null;
   const waitedMs = now - askedAt;
   if (waitedMs <= CONFIRM_MS) return { state: "asked", word: ORDER_TEXTS.asked, detail: ORDER_TEXTS.askedAgo(fixed(waitedMs, 0)) };
   return { state: "unconfirmed", word: ORDER_TEXTS.notConfirmed, detail: ORDER_TEXTS.nobody(fixed(waitedMs / 1000, 0)) };
