@@ -269,27 +269,6 @@ async def test_arming_needs_a_hold_that_has_not_expired(browser: Any, boat: Boat
             assert not boat.arming.value.armed, held_s
 
 
-async def test_a_press_that_had_to_ask_for_the_key_holds_nothing(
-    browser: Any, boat: Boat, spawn: Spawn, config: Config
-) -> None:
-    """Whoever types has let go of the button, of which the page hears nothing."""
-    key = await asyncio.to_thread(ensure_operator_key, config.bus)
-    async with spawn("operator"), spawn("dashboard"):
-        page, held = await browser.new_page(), []
-        page.on("request", lambda request: held.append(request.url) if request.url.endswith("/arm/hold") else None)
-        page.on("dialog", lambda dialog: dialog.accept(key))
-        await page.goto(f"http://127.0.0.1:{config.dashboard.port}")
-        await until(page, "!document.querySelector('#arm').disabled")
-        await page.hover("#arm")
-        await page.mouse.down()
-        await until(page, "sessionStorage.getItem('paani-key') !== null")
-        await asyncio.sleep(0.5)
-        assert held == []
-        await page.mouse.up()
-        await hold_to_arm(page)
-        await wait_for_arming(boat, armed=True, stopped=False)
-
-
 @pytest.mark.rotating(cpu_s=4)
 async def test_a_phone_shows_everything_without_scrolling_sideways(
     browser: Any, boat: Boat, spawn: Spawn, config: Config

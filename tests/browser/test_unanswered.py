@@ -1,4 +1,4 @@
-"""What the page does where an answer or one of its own files never comes."""
+"""What the page does where an answer or one of its own files never comes, or it has to ask first."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ import pytest
 
 from paani import keys
 from paani.config import Config
+from paani.operator_key import ensure_operator_key
 from tests.arming import arm_on_page
 from tests.browser.conftest import Boat
 from tests.browser.test_drive import WAIT_S, Orders, drive_manually
-from tests.browser.test_page import hold_to_arm, until, watch
+from tests.browser.test_page import hold_to_arm, until, wait_for_arming, watch
 from tests.conftest import OpenAs, Spawn
 
 pytestmark = [pytest.mark.browser, pytest.mark.timeout(120)]
@@ -165,3 +166,24 @@ async def test_a_page_without_one_of_its_files_is_loaded_again(
                 await loads.get()
             await page.wait_for_selector("body[data-link='live']", timeout=WAIT_S * 1e3)
             await page.close()
+
+
+async def test_a_press_that_had_to_ask_for_the_key_holds_nothing(
+    browser: Any, boat: Boat, spawn: Spawn, config: Config
+) -> None:
+    """Whoever types has let go of the button, of which the page hears nothing."""
+    key = await asyncio.to_thread(ensure_operator_key, config.bus)
+    async with spawn("operator"), spawn("dashboard"):
+        page, held = await browser.new_page(), []
+        page.on("request", lambda request: held.append(request.url) if request.url.endswith("/arm/hold") else None)
+        page.on("dialog", lambda dialog: dialog.accept(key))
+        await page.goto(f"http://127.0.0.1:{config.dashboard.port}")
+        await until(page, "!document.querySelector('#arm').disabled")
+        await page.hover("#arm")
+        await page.mouse.down()
+        await until(page, "sessionStorage.getItem('paani-key') !== null")
+        await asyncio.sleep(0.5)
+        assert held == []
+        await page.mouse.up()
+        await hold_to_arm(page)
+        await wait_for_arming(boat, armed=True, stopped=False)

@@ -92,6 +92,25 @@ async def test_noise_floods_and_deaf_stations_hold_back_nobody(spawn: Spawn, ope
         assert process.returncode is None
 
 
+async def test_a_page_in_a_browser_on_this_machine_is_no_station(spawn: Spawn, open_as: OpenAs) -> None:
+    """Any site's page may send frames to any port, in a request's body; without a key, whoever is local may command."""
+    tcp = find_free_port()
+    requests = (await open_as("observer")).queue(keys.REQUESTS["mavlink"])
+    async with spawn("mavlink", f"mavlink.tcp=127.0.0.1:{tcp}", 'mavlink.udp=""'):
+        page, good = await Client.connect(tcp), await Client.connect(tcp)
+        page.writer.write(b"POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nOrigin: http://elsewhere.example\r\n\r\n")
+        page.send(HEARTBEAT)
+        page.send(DISARM)
+        with contextlib.suppress(ConnectionResetError):  # of what came after the first words nothing is read
+            async with asyncio.timeout(5.0):
+                assert await page.reader.read() == b""
+        good.send(HEARTBEAT)
+        await good.until("HEARTBEAT")
+        assert requests.drain() == []
+        for client in (page, good):
+            client.writer.close()
+
+
 async def test_stations_that_say_nothing_keep_nobody_out(spawn: Spawn) -> None:
     """As many as may connect, over links that were lost: once the first has been silent, another takes its place."""
     tcp = find_free_port()

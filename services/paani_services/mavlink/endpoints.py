@@ -23,6 +23,7 @@ LOG = logging.getLogger(__name__)
 MAX_UNREAD_BYTES = 65_536  # ten seconds of telemetry: whoever has not read it is not there
 CHUNK_BYTES = 4096
 SILENT_S = 5.0  # five heartbeats: a station that says nothing keeps no other out
+BROWSER_WORDS = (b"GET ", b"POST ", b"HEAD ", b"OPTIONS ")  # a page of any site reaches the ports of its own machine
 PAUSE_S = 0.1  # before the next chunk is read, after one that came too fast and was thrown away
 
 
@@ -114,6 +115,8 @@ class Endpoints:
             )  # fmt: skip
             try:
                 while data := await reader.read(CHUNK_BYTES):
+                    if data.startswith(BROWSER_WORDS):
+                        return
                     self._heard_us[writer] = self._steady.now_us()
                     if not self._gateway.receive(station, data, self._clock.now_us()):
                         await asyncio.sleep(PAUSE_S)
