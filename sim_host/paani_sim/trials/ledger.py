@@ -1,11 +1,13 @@
 """The ledger of drives whose seeds nobody may mend on: a JSON line when a seed is drawn, one when its drive ends.
 
-Lines are only ever appended. A drawn seed without a result therefore stays visible, and so does every commit that seeds
-were drawn for. The file belongs into the repository, whose history shows a line that was taken away.
+Lines are only ever appended, whole, and none twice, whoever else enters drives at the same time. A drawn seed without a
+result therefore stays visible, and so does every commit that seeds were drawn for. The file belongs into the
+repository, whose history shows a line that was taken away.
 """
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import hashlib
 import os
@@ -74,11 +76,11 @@ class Ledger:
         self._path, self._commit, self._sets = path, commit, tuple(sets)
         entries = read_ledger(path)
         self._drawn = {_key(each) for each in entries if isinstance(each, LedgerDraw)}
-        self._results: dict[_Key, list[str]] = {}
+        self._results: dict[_Key, set[str]] = {}
         self._commits = {(each.part, each.commit) for each in entries}
         for entry in entries:
             if isinstance(entry, LedgerResult):
-                self._results.setdefault(_key(entry), []).append(entry.result_sha256)
+                self._results.setdefault(_key(entry), set()).add(entry.result_sha256)
 
     def enter_draws(self, cases: Iterable[TrialCase]) -> None:
         """Append a line for each drive that is not in it. Raises UserError where that fails."""
@@ -91,7 +93,7 @@ class Ledger:
         """Append a drive's result unless the very same one is there. Raises UserError where that fails."""
         draw, data = self._draw(case), msgspec.json.encode(result)
         checksum = hashlib.sha256(data).hexdigest()
-        known = self._results.setdefault(_key(draw), [])
+        known = self._results.setdefault(_key(draw), set())
         if checksum in known:
             return
         entry = LedgerResult(
@@ -105,7 +107,7 @@ class Ledger:
             result_sha256=checksum,
         )
         _append(self._path, [entry])
-        known.append(checksum)
+        known.add(checksum)
 
     def count(self, part: SeedPart) -> LedgerCounts:
         """Counts of this commit's and settings' drives."""
@@ -147,15 +149,21 @@ def read_ledger(path: Path) -> list[LedgerEntry]:
 
 
 def _append(path: Path, entries: Sequence[LedgerEntry]) -> None:
-    """Append whole lines, on the disk when it returns."""
+    """Append the lines that are not there by now, on the disk when it returns; all of them or none."""
     if not entries:
         return
-    data = b"".join(msgspec.json.encode(entry) + b"\n" for entry in entries)
     try:
-        with path.open("ab") as file:
+        with path.open("a+b", buffering=0) as file:
             fcntl.flock(file, fcntl.LOCK_EX)
-            file.write(data)
-            file.flush()
+            file.seek(0)
+            before = file.read()
+            held = set(before.splitlines())
+            lines = [line for line in map(msgspec.json.encode, entries) if line not in held]
+            start = b"" if before.endswith(b"\n") or not before else b"\n"
+            data = start + b"".join(line + b"\n" for line in lines)
+            if file.write(data) < len(data):
+                file.truncate(len(before))
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
             os.fsync(file.fileno())
     except OSError as error:
         raise UserError(f"--ledger {path}: {error.strerror}") from error

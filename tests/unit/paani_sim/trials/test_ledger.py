@@ -1,12 +1,16 @@
 """The ledger of drives, and which checkout may draw fresh seeds."""
 
+import resource
 import shutil
 import subprocess
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
 import msgspec
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from paani.errors import UserError
 from paani_sim.trials import command
@@ -73,6 +77,60 @@ def test_lines_are_only_appended_and_nothing_is_entered_twice(tmp_path: Path) ->
     assert file.read_bytes().startswith(before)
     assert len(read_ledger(file)) == 5
     assert again.count(SeedPart.FRESH).differing == 1
+
+
+@given(st.lists(st.tuples(st.booleans(), st.sampled_from(CASES), st.sampled_from([0, 1, None])), max_size=12))
+def test_two_runs_at_once_enter_each_line_once(steps: list[tuple[bool, TrialCase, int | None]]) -> None:
+    """Both have read the ledger before either writes; a result with None is a draw alone."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "ledger.jsonl"
+        runs = Ledger(file, COMMIT, ()), Ledger(file, COMMIT, ())
+        went: dict[TrialCase, set[int]] = {}
+        for is_second, case, collisions in steps:
+            runs[is_second].enter_draws([case])
+            went.setdefault(case, set())
+            if collisions is not None:
+                runs[is_second].enter_result(case, msgspec.structs.replace(RESULT, collisions=collisions))
+                went[case].add(collisions)
+        lines = file.read_bytes().splitlines() if steps else []
+        assert len(lines) == len(set(lines)) == len(went) + sum(map(len, went.values()))
+        counts = Ledger(file, COMMIT, ()).count(SeedPart.FRESH)
+    assert counts.drawn == len(went)
+    assert counts.with_result == sum(map(bool, went.values()))
+    assert counts.differing == sum(len(each) > 1 for each in went.values())
+
+
+def test_a_line_written_twice_is_no_drive_that_went_otherwise(tmp_path: Path) -> None:
+    file = tmp_path / "ledger.jsonl"
+    ledger = Ledger(file, COMMIT, ())
+    ledger.enter_draws(CASES[:1])
+    ledger.enter_result(CASES[0], RESULT)
+    file.write_bytes(2 * file.read_bytes())
+    assert Ledger(file, COMMIT, ()).count(SeedPart.FRESH).differing == 0
+
+
+def test_a_last_line_without_its_end_stays_a_line_of_its_own(tmp_path: Path) -> None:
+    file = tmp_path / "ledger.jsonl"
+    Ledger(file, COMMIT, ()).enter_draws(CASES[:1])
+    file.write_bytes(file.read_bytes().rstrip())
+    Ledger(file, COMMIT, ()).enter_draws(CASES)
+    assert len(read_ledger(file)) == len(CASES)
+
+
+def test_a_full_disk_leaves_no_part_of_a_line(tmp_path: Path) -> None:
+    file = tmp_path / "ledger.jsonl"
+    ledger = Ledger(file, COMMIT, ())
+    ledger.enter_draws(CASES[:1])
+    before, limits = file.read_bytes(), resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (len(before) + 10, limits[1]))
+    try:
+        with pytest.raises(UserError, match="--ledger"):
+            ledger.enter_draws(CASES)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert file.read_bytes() == before
+    ledger.enter_draws(CASES)
+    assert len(read_ledger(file)) == len(CASES)
 
 
 def test_settings_and_commits_are_counted_apart(tmp_path: Path) -> None:
