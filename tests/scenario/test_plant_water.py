@@ -174,9 +174,9 @@ def test_hits_name_what_was_touched_and_when(launch: Launch) -> None:
     plant.place(sail.pose.x_m - 7.0, sail.pose.y_m, 0.0)
     for _ in range(2500):
         plant.step(6.0, 6.0)
-    assert {hit.name for hit in plant.contact_starts} == {"sail_middle"}
-    assert plant.collisions == len(plant.contact_starts) >= 1
-    assert 3.0 < plant.contact_starts[0].time_s < 12.0
+    assert {hit.name for hit in plant.touches} == {"sail_middle"}
+    assert plant.collisions == len(plant.touches) >= 1
+    assert 3.0 < plant.touches[0].began_s < 12.0
 
 
 def test_gps_outage_and_jump(launch: Launch) -> None:

@@ -42,11 +42,12 @@ class PlantDiverged(Exception):
     """The integration left the finite numbers: forces or settings are impossible."""
 
 
-class ContactStart(NamedTuple):
-    """The boat began to touch the geom of this name: an obstacle's or actor's id, `bank_<n>`, or `shoal_<n>`."""
+class Touch(NamedTuple):
+    """The boat touched the geom of this name: an obstacle's or actor's id, `bank_<n>`, or `shoal_<n>`."""
 
-    time_s: float
     name: str
+    began_s: float
+    ended_s: float
 
 
 class Plant:
@@ -108,9 +109,9 @@ class Plant:
         self.energy_j = 0.0
         self.collisions = 0
         self.in_contact = False
-        self.contact_starts: list[ContactStart] = []
+        self.touches: list[Touch] = []
         self._last_contact_s = -math.inf
-        self._last_contact_of_s: dict[str, float] = {}
+        self._last_touch_of: dict[str, int] = {}  # index in `touches`
         mujoco.set_mju_user_warning(_keep_no_log_file)
         mujoco.mj_forward(self._model, self._data)
 
@@ -277,9 +278,12 @@ class Plant:
             self._last_contact_s = now_s
 
     def _record_contact(self, name: str, now_s: float) -> None:
-        if now_s - self._last_contact_of_s.get(name, -math.inf) > COLLISION_GAP_S:
-            self.contact_starts.append(ContactStart(now_s, name))
-        self._last_contact_of_s[name] = now_s
+        last = self._last_touch_of.get(name)
+        if last is not None and now_s - self.touches[last].ended_s <= COLLISION_GAP_S:
+            self.touches[last] = self.touches[last]._replace(ended_s=now_s)
+            return
+        self._last_touch_of[name] = len(self.touches)
+        self.touches.append(Touch(name, now_s, now_s))
 
 
 def _keep_no_log_file(_: str) -> None:

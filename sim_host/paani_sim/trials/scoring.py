@@ -12,7 +12,7 @@ from paani.arrays import F64
 from paani.config import EyeConfig
 from paani.statistics.dithering import dithering
 from paani.statistics.order_statistics import nearest_rank
-from paani_sim.plant.plant import ContactStart
+from paani_sim.plant.plant import Touch
 from paani_sim.trials.drive import SAMPLE_HZ, Drive
 from paani_sim.trials.drive_history import DriveSample, StopInterval, ThrustChange
 from paani_sim.trials.drive_states import DriveOutcome
@@ -61,7 +61,7 @@ def score_drive(drive: Drive, policy: Policy) -> TrialResult:
     world, samples = scenario.world, history.samples
     hull_path = build_hull_path(world, drive.plant.vessel.hull, samples)
     clearances_m = compute_clearances_m(world, hull_path)
-    contacts = find_contacts(world, drive.plant.contact_starts, samples, hull_path, eye)
+    contacts = find_contacts(world, drive.plant.touches, samples, hull_path, eye)
     encounters = find_encounters(world, samples, clearances_m, contacts)
     cross_track_m = np.array([sample.cross_track_m for sample in samples] or [0.0])
     things = [encounter for encounter in encounters if encounter.what != BANK]
@@ -126,31 +126,33 @@ def build_hull_path(world: World, hull: Hull, samples: Sequence[DriveSample]) ->
 
 def find_contacts(
     world: World,
-    contact_starts: Sequence[ContactStart],
+    touches: Sequence[Touch],
     samples: Sequence[DriveSample],
     hull_path: HullPath,
     eye: EyeConfig,
 ) -> tuple[Contact, ...]:
     """Find each time the hull began to touch something, and whether the camera could have seen it before.
 
-    Touches of one thing that begin within `CONTACT_GAP_S` of each other are one contact, as of a hull that scrapes.
+    A touch that begins within `CONTACT_GAP_S` of the end of those before of the same thing is one contact with them, as
+    of a hull that scrapes. touches: in the order in which they began.
     """
-    kinds, found, last_s = map_kinds(world), list[Contact](), dict[str, float]()
+    kinds, found, until_s = map_kinds(world), list[Contact](), dict[str, float]()
     half_fov_rad = math.radians(0.5 * eye.hfov_deg)
-    for start in contact_starts:
-        k = next((k for k, sample in enumerate(samples) if sample.t_s >= start.time_s), len(samples) - 1)
+    for touch in touches:
+        k = next((k for k, sample in enumerate(samples) if sample.t_s >= touch.began_s), len(samples) - 1)
         if k < 0:
             continue
-        what = BANK if start.name.startswith(BANK_GEOM_PREFIX) else start.name
-        before_s, last_s[what] = last_s.get(what, -math.inf), start.time_s
-        if start.time_s - before_s <= CONTACT_GAP_S:
+        what = BANK if touch.name.startswith(BANK_GEOM_PREFIX) else touch.name
+        before_s = until_s.get(what, -math.inf)
+        until_s[what] = max(before_s, touch.ended_s)
+        if touch.began_s - before_s <= CONTACT_GAP_S:
             continue
         before = hull_path.slice_moments(slice(max(0, k - round(VISIBLE_BEFORE_S * SAMPLE_HZ)), k + 1, 2))
         found.append(
             Contact(
                 what=what,
                 kind=kinds.get(what, Kind.OTHER.value),
-                at_s=round(start.time_s, 2),
+                at_s=round(touch.began_s, 2),
                 x_m=round(samples[k].x_m, 2),
                 y_m=round(samples[k].y_m, 2),
                 speed_mps=round(abs(samples[max(0, k - 2)].surge_mps), 3),

@@ -10,7 +10,7 @@ import pytest
 
 import paani_sim.vessels
 from paani.config import PlantConfig
-from paani_sim.plant.plant import Plant, PlantDiverged
+from paani_sim.plant.plant import COLLISION_GAP_S, Plant, PlantDiverged
 from paani_sim.vessels import load_vessel
 from paani_sim.worlds import Behaviour, Fault, FaultKind, Scenario, World, load_world
 
@@ -98,6 +98,8 @@ def test_running_into_the_bank_counts_once(open_plant: OpenPlant) -> None:
     drive(plant, 1500, FORCE_N * 0.06)
     assert plant.collisions == 1
     assert plant.in_contact
+    assert plant.touches[-1].ended_s == pytest.approx(15.0)
+    assert max(touch.ended_s - touch.began_s for touch in plant.touches) > COLLISION_GAP_S
     plant.place(east_m - 4.0, 0.0, 0.0)
     drive(plant, 1500, FORCE_N * 0.06)
     assert plant.collisions == 2

@@ -77,6 +77,6 @@ def test_the_keel_grounds_where_the_water_is_less_deep_than_its_draught(top_m: f
         plant.place(-3.0, 0.0, 0.0)
         for _ in range(1400):
             plant.step(6.0, 6.0)
-        assert {each.name for each in plant.contact_starts} == ({"shoal_0"} if is_touched else set())
+        assert {each.name for each in plant.touches} == ({"shoal_0"} if is_touched else set())
     finally:
         plant.close()

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from paani import messages as m
 from paani.config import load_config
-from paani_sim.plant.plant import ContactStart
+from paani_sim.plant.plant import Touch
 from paani_sim.trials.drive_history import DriveHistory, DriveSample, StopInterval, ThrustChange
 from paani_sim.trials.fault_reactions import measure_reactions
 from paani_sim.trials.hull_clearance import (
@@ -27,6 +27,7 @@ from paani_sim.trials.lockstep_bus import START_US
 from paani_sim.trials.result import Closeness, Contact
 from paani_sim.trials.route_progress import RouteProgress
 from paani_sim.trials.scoring import (
+    CONTACT_GAP_S,
     build_hull_path,
     classify_closeness,
     find_contacts,
@@ -185,28 +186,42 @@ def test_a_bridge_that_a_hull_can_touch_is_scored() -> None:
     assert set(compute_clearances_m(with_things(low, high), hull_path(POND, [(0.0, 0.0, 0.0)]))) == {"barge", BANK}
 
 
-def contacts(*starts: tuple[float, str]) -> list[tuple[str, float, bool]]:
+def contacts(*touches: tuple[str, float, float]) -> list[tuple[str, float, bool]]:
     """Of a boat that drives towards the buoy and, a quarter of a minute later, away from it."""
     places = [(-8.0 + 0.05 * k, 3.0, 0.0) for k in range(600)]
     history = [sample._replace(actors_along_m=()) for sample in samples(places)]
     world = with_things(BUOY, BARGE)
     path = build_hull_path(world, HULL, history)
-    found = find_contacts(world, [ContactStart(*start) for start in starts], history, path, load_config().eye)
+    found = find_contacts(world, [Touch(*touch) for touch in touches], history, path, load_config().eye)
     return [(each.what, each.at_s, each.visible) for each in found]
 
 
 def test_touches_that_follow_each_other_within_five_seconds_are_one_contact() -> None:
-    touches = [(10.0, "buoy"), (14.9, "buoy"), (19.8, "buoy"), (24.9, "buoy"), (25.0, "barge")]
+    starts = [("buoy", 10.0), ("buoy", 14.9), ("buoy", 19.8), ("buoy", 24.9), ("barge", 25.0)]
+    touches = [(name, start_s, start_s) for name, start_s in starts]
     assert [each[:2] for each in contacts(*touches)] == [("buoy", 10.0), ("buoy", 24.9), ("barge", 25.0)]
 
 
+@given(st.lists(st.tuples(st.floats(0.0, 30.0), st.floats(0.1, 20.0), st.integers(0, 3)), max_size=8))
+def test_contacts_are_counted_by_the_time_without_a_touch(drawn: list[tuple[float, float, int]]) -> None:
+    """However long each touch lasts, whichever piece of the bank it is with, and where touches overlap."""
+    touches = sorted((start_s, start_s + length_s, f"bank_{piece}") for start_s, length_s, piece in drawn)
+    apart = [
+        start_s
+        for number, (start_s, _, _) in enumerate(touches)
+        if all(start_s - end_s > CONTACT_GAP_S for _, end_s, _ in touches[:number])
+    ]
+    found = contacts(*((name, start_s, end_s) for start_s, end_s, name in touches))
+    assert [each[1] for each in found] == [round(start_s, 2) for start_s in apart]
+
+
 def test_all_pieces_of_the_bank_are_one_bank() -> None:
-    found = contacts((10.0, "bank_0"), (14.0, "bank_1"), (30.0, "bank_0"))
+    found = contacts(("bank_0", 10.0, 10.0), ("bank_1", 14.0, 14.0), ("bank_0", 30.0, 30.0))
     assert [each[:2] for each in found] == [(BANK, 10.0), (BANK, 30.0)]
 
 
 def test_a_contact_with_what_was_before_the_camera_is_visible_and_with_what_was_behind_it_is_not() -> None:
-    assert [each[2] for each in contacts((10.0, "buoy"), (40.0, "buoy"))] == [True, False]
+    assert [each[2] for each in contacts(("buoy", 10.0, 10.0), ("buoy", 40.0, 40.0))] == [True, False]
 
 
 def test_encounters_have_one_closest_point_each() -> None:
@@ -263,6 +278,8 @@ def test_latency_is_of_the_first_thrust_of_each_picture() -> None:
     ]
     assert summarise_latency(applied) == summarise_latency(applied[:3])
     assert (summarise_latency(applied).p50_s, summarise_latency(applied).samples) == (0.11, 2)
+    held = [ThrustChange(1_700_000, True, 1_600_000), ThrustChange(1_900_000, False, 1_600_000)]
+    assert summarise_latency(held).max_s == 0.3
 
 
 def reaction_of(*applied: ThrustChange, frames_unusable: tuple[int, ...] = ()) -> tuple[float | None, bool]:
@@ -290,6 +307,14 @@ def test_reaction_to_a_black_camera() -> None:
     assert reaction_of(go, ThrustChange(at(10.71), True, 0)) == (0.71, False)
     assert reaction_of(go) == (None, False)
     assert reaction_of(go, ThrustChange(at(9.0), True, 0)) == (0.0, True)
+
+
+def test_only_faults_while_the_boat_is_armed_are_judged() -> None:
+    """It is armed from 3 s to 23 s; with its fans off before, it would have reacted at once."""
+    history = DriveHistory()
+    history.samples = samples([(0.0, 0.0, 0.0)] * 201)
+    faults = [Fault(FaultKind.CAMERA_BLACK, start_s, 5.0) for start_s in (2.9, 3.0, 23.0, 23.1)]
+    assert [each.at_s for each in measure_reactions(faults, history, 0.2)] == [3.0, 23.0]
 
 
 def test_progress_along_an_open_and_a_closed_route() -> None:
