@@ -127,6 +127,10 @@ def test_near_objects_are_counted_apart() -> None:
     truth = np.array([[0, 0, 0, 10, 10], [0, 100, 100, 120, 120]], np.float32)
     figures = class_figures([found], [truth], kind=0)
     assert (figures["recall_at_0.40"], figures["recall_16px_at_0.40"]) == (0.5, 1.0)
+    flat = np.array([[0, 0, 40, 50, 55.5]], np.float32)  # 15.5 px high
+    unsure = Detections(np.array([[200, 0, 230, 30]], np.float32), np.array([0.4], np.float32), np.array([0]))
+    more = class_figures([found, unsure], [np.vstack([truth, flat]), np.array([[0, 200, 0, 230, 30]], np.float32)], 0)
+    assert (more["recall_at_0.40"], more["recall_16px_at_0.40"]) == (0.25, 0.5)
 
 
 def test_a_class_without_a_case_has_no_figure() -> None:

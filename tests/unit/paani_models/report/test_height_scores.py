@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from paani_models.datasets.sources import Sample, Source
-from paani_models.detector.metrics import Detections, match_class, summarise_class
+from paani_models.detector.metrics import Detections, average_precision, iou_matrix, match_class, summarise_class
+from paani_models.detector.scores import ScoredBoxes
+from paani_models.report.box_errors import analyse_box_errors
 from paani_models.report.height_scores import (
     ANY_HEIGHT_PX,
     DetectorRun,
@@ -61,6 +63,46 @@ def test_a_second_box_on_one_person_is_an_alarm() -> None:
         detections((0.9, 0, 0, 10, 12), (0.8, 0, 0, 10, 11.5)), people((0, 0, 10, 12)), 0, (8.0, 16.0)
     )
     assert hits.tolist() == [True, False]
+
+
+def coco_matches(found: Detections, truth: np.ndarray, low: float, high: float) -> tuple[list[float], list[bool]]:
+    """COCO's rules one box at a time: true boxes out of range come last, and who takes one of them does not count."""
+    is_other = [not low <= box[3] - box[1] < high for box in truth[:, 1:]]
+    order, taken, scores, hits = sorted(range(len(truth)), key=lambda row: is_other[row]), set(), [], []
+    for mine in sorted(range(len(found.scores)), key=lambda row: -found.scores[row]):
+        best, chosen = 0.5, None
+        for row in order:
+            if row in taken or (chosen is not None and not is_other[chosen] and is_other[row]):
+                continue
+            shared = iou_matrix(found.boxes[mine : mine + 1], truth[row : row + 1, 1:])[0, 0]
+            if shared >= best:
+                best, chosen = shared, row
+        if chosen is not None:
+            taken.add(chosen)
+        is_own = low <= found.boxes[mine, 3] - found.boxes[mine, 1] < high
+        if is_own if chosen is None else not is_other[chosen]:
+            scores.append(float(found.scores[mine]))
+            hits.append(chosen is not None)
+    return scores, hits
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_ranges_of_height_are_scored_by_cocos_rules(seed: int) -> None:
+    """Crowded boxes about 16 px high, many of which lie on several people of either range; equal scores among them."""
+    rng = np.random.default_rng(seed)
+    corners = rng.uniform(0, 30, (8, 2))
+    truth = people(*((*corner, *(corner + rng.uniform(11, 21, 2))) for corner in corners))
+    drawn = truth[rng.integers(0, 8, 20), 1:] + rng.normal(0, 1.5, (20, 4))
+    found = detections(*((score, *box) for score, box in zip(rng.choice([0.3, 0.6, 0.9], 20), drawn, strict=True)))
+    sample = Sample(RIVER, "a", held_out=True, picture=Path("p.jpg"), mask=None, label=None)
+    (errors,) = analyse_box_errors([ScoredBoxes(sample, found, truth)])
+    for band in errors.rows[2:4]:
+        scores, hits = coco_matches(found, truth, band.low, band.high)
+        kept, are_hits, positives = match_in_range(found, truth, 0, (band.low, band.high))
+        assert (kept.tolist(), are_hits.tolist(), positives) == (pytest.approx(scores), hits, band.n)
+        assert band.found == sum(hit for score, hit in zip(scores, hits, strict=True) if score > 0.40)
+        expected = average_precision(np.array(scores, np.float32), np.array(hits, np.bool_), band.n)
+        assert band.ap50 == pytest.approx(expected, nan_ok=True)
 
 
 def results(seed: int = 0) -> tuple[list[PictureResult], list[DetectorRun]]:

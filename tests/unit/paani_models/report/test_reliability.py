@@ -10,7 +10,7 @@ import pytest
 from paani_models.datasets.sources import Sample, Source
 from paani_models.detector.metrics import Detections
 from paani_models.report.height_scores import DetectorRun, PictureResult, score_heights, truth_pictures
-from paani_models.report.reliability import Reliability, format_reliability, measure_reliability
+from paani_models.report.reliability import Reliability, calibration_error, format_reliability, measure_reliability
 
 LAKE = Source("lake", "lake", labels="labels", annotated=frozenset({"person", "buoy"}))
 BEACH = Source("beach", "beach", labels="labels", annotated=frozenset({"person"}), loose_boxes=True)
@@ -52,6 +52,12 @@ def test_the_error_is_the_mean_distance_of_score_and_share_right() -> None:
     assert (row.error.low, row.error.high) == pytest.approx((0.05, 0.05))  # both sequences are alike
     assert (row.boxes, row.positives) == (16, 12)
     assert "0.85->0.75 (8)" in format_reliability([row])
+
+
+def test_every_bin_adds_its_distance_whichever_way_it_lies() -> None:
+    """Two bins too sure and one not sure enough: 0.4 and 1.0 and 0.6 of ten boxes."""
+    cells = np.array([[4.0, 3.4, 3.0], [4.0, 2.0, 1.0], [2.0, 0.4, 1.0]])
+    assert calibration_error(cells) == pytest.approx(0.2)
 
 
 def test_a_person_is_worth_more_false_alarms_than_a_buoy() -> None:

@@ -62,6 +62,14 @@ def test_mistakes_by_distance_and_height() -> None:
     assert judged.tolist() == [800] * 10
 
 
+@pytest.mark.parametrize(("row", "near"), [(47, [80, 80, 80]), (46, [0, 80, 80]), (41, [0, 0, 80]), (40, [0, 0, 0])])
+def test_a_mistake_is_near_an_edge_up_to_the_whole_distance(row: int, near: list[int]) -> None:
+    """The edge between rows 49 and 50 lies in both."""
+    label = shore()
+    label[row] = WATER
+    assert count_mask_errors(label, shore())[4].tolist() == near
+
+
 def test_an_undecided_band_counts_as_edge_and_is_split_along_its_middle() -> None:
     truth = shore()
     truth[40:50] = IGNORE

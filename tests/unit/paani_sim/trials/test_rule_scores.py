@@ -217,6 +217,24 @@ def test_a_turn_in_time_is_measured() -> None:
     assert each.scores["14"] > 0.5
 
 
+def test_a_boat_that_gathers_way_has_not_acted() -> None:
+    path, surge_mps = straight_drive("imazu-01")
+    surge_mps[:30] = np.linspace(0.0, NOMINAL_BOAT_MPS, 30)
+    [each] = measure_rule_encounters(build_imazu_scenario("imazu-01").world, path, surge_mps, NOMINAL_BOAT_MPS, 70.0)
+    assert each.manoeuvre.acted_m is None
+    assert each.manoeuvre.least_mps >= 0.9 * NOMINAL_BOAT_MPS
+
+
+@pytest.mark.parametrize(("offset_m", "is_entered"), [(3.6, True), (-3.6, False)])
+def test_the_ship_domain_is_entered_from_starboard_at_a_distance_that_is_clear_to_port(
+    offset_m: float, is_entered: bool
+) -> None:
+    path, surge_mps = straight_drive("imazu-01", offset_m)
+    [each] = measure_rule_encounters(build_imazu_scenario("imazu-01").world, path, surge_mps, NOMINAL_BOAT_MPS, 70.0)
+    assert each.is_domain_entered is is_entered
+    assert each.manoeuvre.bearing_deg * offset_m > 0.0
+
+
 def test_what_is_abeam_is_not_seen_by_a_lens() -> None:
     path, surge_mps = straight_drive("imazu-06")
     world = build_imazu_scenario("imazu-06").world
@@ -245,8 +263,10 @@ def test_cases_are_summed_by_form_and_group_and_never_over_them() -> None:
         "camera-fair": {"all seen": 1},
     }
     partly = found["plain"]["partly seen"]
-    assert (partly.contacts, partly.untouched_share.share, partly.domain_entered) == (2, 0.0, 1)
+    assert (partly.contacts, partly.untouched_share.share, partly.near, partly.domain_entered) == (2, 0.0, 0, 1)
     assert partly.scores["head_on"].encounters == partly.scores["crossing_starboard"].encounters == 1
     assert partly.time_lost_s == pytest.approx(100.0 - 40.0 / 0.6, abs=0.01)
+    halted = {TrialCase("imazu-05", 1, Policy.PAANI): msgspec.structs.replace(hit, completed=False)}
+    assert summarise_imazu(halted)["paani"]["plain"]["partly seen"].time_lost_s is None
     assert len(format_imazu({"paani": found})) == 2 + 4
     assert summarise_imazu({TrialCase("lake", 1, Policy.PAANI): RESULT}) == {}

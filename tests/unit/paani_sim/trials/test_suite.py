@@ -12,7 +12,7 @@ from paani_sim.trials import command
 from paani_sim.trials.drive_states import DriveOutcome
 from paani_sim.trials.fingerprint import Fingerprint, FingerprintReader
 from paani_sim.trials.policies import Policy, load_policy_config
-from paani_sim.trials.result import Reaction
+from paani_sim.trials.result import Closeness, Reaction
 from paani_sim.trials.run_suite import (
     StoredResult,
     encode_stored_result,
@@ -21,7 +21,7 @@ from paani_sim.trials.run_suite import (
     result_path,
 )
 from paani_sim.trials.seed_parts import SeedPart
-from paani_sim.trials.suite_summary import Summary, summarise_suite
+from paani_sim.trials.suite_summary import Summary, summarise_drives, summarise_suite
 from paani_sim.trials.summary_table import format_summary
 from paani_sim.trials.trial_cases import (
     OTHER_FAULTS,
@@ -187,6 +187,32 @@ def test_figures_have_what_the_scoring_reads() -> None:
     text = format_summary(summary)
     assert "camera_black" in text
     assert text.startswith("development seeds: 2; drives: 4\n")
+
+
+def test_sums_over_drives_are_weighted_by_their_time_and_way_and_leave_banks_apart() -> None:
+    met = RESULT.encounters[0]
+    bank = msgspec.structs.replace(met, what="bank", kind="bank", clearance_m=0.1, closeness=Closeness.GRAZING)
+    hit = msgspec.structs.replace(met, clearance_m=0.0, closeness=Closeness.CONTACT)
+    far = msgspec.structs.replace(met, clearance_m=2.0, closeness=Closeness.CLEAR)
+    short = msgspec.structs.replace(
+        RESULT, distance_m=400.0, collisions=1, near_misses=1, near_misses_bank=1, encounters=(met, bank, hit)
+    )
+    long = msgspec.structs.replace(
+        RESULT, seed=2, distance_m=600.0, seconds=300.0, near_misses=1, min_clearance_m=0.2, off_route_rms_m=3.0,
+        encounters=(met, far),
+    )  # fmt: skip
+    found = summarise_drives([short, long])
+    assert (found.contacts_per_km, found.near_misses_per_km, found.close_per_km) == (1.0, 2.0, 3.0)
+    assert found.near_misses_per_km_interval == pytest.approx((0.242, 7.225), abs=0.03)
+    assert (found.encountered, found.near_encounter_share.share, found.touched_encounter_share.share) == (4, 0.5, 0.25)
+    assert (found.near_misses_bank, found.encounters["grazing"], found.min_clearance_m) == (1, 0, 0.2)
+    assert (found.untouched_share.share, found.seen_untouched_share.share) == (0.5, 1.0)
+    assert found.off_route_rms_m == pytest.approx(((1.0 * 100.0 + 9.0 * 300.0) / 400.0) ** 0.5, abs=1e-3)
+    assert (found.mean_speed_mps, found.unusable_frac) == (2.5, 0.01)
+    tenfold = summarise_drives(
+        [msgspec.structs.replace(each, distance_m=10 * each.distance_m) for each in (short, long)]
+    )
+    assert tenfold.near_misses_per_km_interval == pytest.approx((0.024, 0.722), abs=0.003)
 
 
 def test_w6_a_drive_that_does_not_recover_from_its_fault_counts_as_none() -> None:

@@ -52,6 +52,19 @@ def test_what_is_taken_once_does_not_last_and_what_is_taken_on_and_on_does(taken
     assert soaked(once).lasting_slope_mib_h == pytest.approx(6.0)
 
 
+def test_what_is_taken_after_ten_minutes_is_no_warm_up() -> None:
+    late = [
+        msgspec.structs.replace(each, rss_mib=each.rss_mib + 5.0 * (k >= 11)) for k, each in enumerate(samples(0.0))
+    ]
+    assert soaked(late).rss_slope_mib_h > 0.0
+
+
+def test_a_restart_while_it_warms_up_counts() -> None:
+    assert (
+        soaked([msgspec.structs.replace(each, pid=1 + (k >= 3)) for k, each in enumerate(samples(0.0))]).restarts == 1
+    )
+
+
 def test_a_restart_is_no_way_to_keep_memory_flat() -> None:
     found = soaked(samples(0.0, restarted=True))
     assert found.restarts == 1
