@@ -13,6 +13,7 @@ from pathlib import Path
 from paani.errors import UserError
 
 PathOf = Callable[[str], Path]
+PICTURE_SUFFIXES = (".jpg", ".jpeg", ".png")  # of those written
 
 
 def input_path(option: str = "") -> PathOf:
@@ -35,6 +36,18 @@ def input_folder(option: str = "") -> PathOf:
 def output_file(option: str) -> PathOf:
     """A file that can be written: its folder exists and takes files, and it is no folder itself."""
     return _checked(option, _output_file_problem)
+
+
+def output_picture(option: str) -> PathOf:
+    """An `output_file` whose name ends as one of `PICTURE_SUFFIXES`."""
+    return _checked(
+        option,
+        lambda path: (
+            f"is not one of {', '.join(PICTURE_SUFFIXES)}"
+            if path.suffix.lower() not in PICTURE_SUFFIXES
+            else _output_file_problem(path)
+        ),
+    )
 
 
 def output_folder(option: str) -> PathOf:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from paani.config import CorridorConfig
 from paani.errors import UserError
 from paani.logs.reader import Log, open_log
-from paani.option_paths import input_path, output_file, require_apart
+from paani.option_paths import input_path, output_picture, require_apart
 from paani.whole_file import write_whole
 from paani_tools.explain.moment import Moment, last_change_us, moment_at
 from paani_tools.explain.narrative import narrative_of
@@ -22,7 +22,6 @@ from paani_tools.look.annotate import annotate_picture
 from paani_tools.replay.compatibility import provenance_of
 
 DAY_US = 86_400_000_000
-PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg")
 
 
 def main(argv: list[str]) -> int:
@@ -34,11 +33,9 @@ def main(argv: list[str]) -> int:
         "default: the last change of direction",
     )  # fmt: skip
     parser.add_argument(
-        "--picture", type=output_file("--picture"), metavar="FILE", help="write the annotated picture (.png or .jpg)"
+        "--picture", type=output_picture("--picture"), metavar="FILE", help="write the annotated picture (.png or .jpg)"
     )
     options = parser.parse_args(argv)
-    if options.picture is not None and options.picture.suffix.lower() not in PICTURE_SUFFIXES:
-        raise UserError(f"--picture {options.picture}: expected a .png or .jpg file")
     log = open_log(options.file)
     require_apart({"--picture": options.picture}, log.files)
     config = provenance_of(log, force=True).config

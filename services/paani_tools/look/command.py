@@ -13,7 +13,7 @@ from paani.cli import add_config_arguments, config_from
 from paani.clock import stopwatch_ms
 from paani.errors import UserError
 from paani.messages import Detection, Direction, LaneRisk, Reason, Text, Unit, UnusableCause
-from paani.option_paths import input_path, output_file, output_folder, require_apart
+from paani.option_paths import input_path, output_folder, output_picture, require_apart
 from paani.whole_file import json_line, write_whole
 from paani_services.camera.picture_sources import list_pictures
 from paani_services.perception.pipeline import Perceiver
@@ -25,7 +25,6 @@ EPOCHS_PER_PATH = 1_000_000
 DEFAULT_OUT = Path("runs/look")
 JPEG_QUALITY = 90
 ANNOTATED_SUFFIX = ".jpg"
-SHEET_SUFFIXES = (".jpg", ".jpeg", ".png")
 
 
 class Lanes(msgspec.Struct, frozen=True):
@@ -52,8 +51,6 @@ def main(argv: list[str]) -> int:
     """Judge every path in turn. Raises UserError naming a path that cannot be read."""
     options = _parser().parse_args(argv)
     config = config_from(options)
-    if options.sheet is not None and options.sheet.suffix.lower() not in SHEET_SUFFIXES:
-        raise UserError(f"--sheet {options.sheet}: is not one of {', '.join(SHEET_SUFFIXES)}")
     out: Path | None = options.out or (None if options.json or options.sheet else DEFAULT_OUT)
     read = [file for path in options.paths for file in (list_pictures(path) if path.is_dir() else [path])]
     require_apart({"--sheet": options.sheet}, read)
@@ -146,7 +143,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--sheet",
-        type=output_file("--sheet"),
+        type=output_picture("--sheet"),
         metavar="FILE",
         help="a few dozen annotated pictures in one; alone, no --out",
     )

@@ -15,6 +15,7 @@ from paani.option_paths import (
     input_path,
     output_file,
     output_folder,
+    output_picture,
     require_apart,
 )
 
@@ -35,6 +36,7 @@ def _folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         (input_folder("--in"), "folder"),
         (output_file("--out"), "file"),
         (output_file("--out"), "folder/new"),
+        (output_picture("--out"), "folder/new.PNG"),
         (output_folder("--out"), "folder"),
         (output_folder("--out"), "folder/new/below"),
     ],
@@ -55,6 +57,8 @@ def test_what_can_be_used_is_a_path(path_of: PathOf, text: str) -> None:
         (output_file("--out"), "folder", "--out folder: is a folder, not a file"),
         (output_file("--out"), "missing/new", "--out missing/new: no such folder: "),
         (output_file("--out"), "file/new", "--out file/new: no such folder: "),
+        (output_picture("--out"), "folder/new.gif", "--out folder/new.gif: is not one of .jpg, .jpeg, .png"),
+        (output_picture("--out"), "missing/new.png", "--out missing/new.png: no such folder: "),
         (output_folder("--out"), "file", "--out file: .*file is a file, not a folder"),
         (output_folder("--out"), "file/new", "--out file/new: .*file is a file, not a folder"),
         (output_file("--out"), "n" * 300, "--out n+: File name too long"),
